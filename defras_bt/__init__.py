@@ -1,0 +1,1 @@
+"""Behaviour-tree executive for soft-tissue retraction under anatomical uncertainty."""

@@ -1,0 +1,103 @@
+"""What the executive hands to everything that records or shows a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defras_bt.monitoring.reading import MonitorReading
+from defras_bt.planning.plan import Plan
+from defras_sim.scene import Scene
+from defras_sim.surface import Surface
+from defras_sim.tissue.state import TissueState
+from defras_sim.worlds.protocol import Command, Observation
+
+Level = Literal["info", "warning", "error"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something worth telling: a sentence that a surgeon understands, and a kind for counting.
+
+    Kinds: start, plan, action, warning, force, learning, replan, goal, human, error, hold, end.
+    """
+
+    time_s: float
+    kind: str
+    level: Level
+    sentence: str
+
+
+@dataclass(frozen=True)
+class TickRecord:
+    """One tick as it happened. ``observation`` is after sensing: cloud and visibility filled in.
+
+    ``force_n``: largest grasp force estimated by the twin, NaN while unknown; ``true_force_n`` None
+    where the world has none. ``true_surface`` only for pictures. ``node_status`` maps each tree
+    path ("defras/operate/act") to SUCCESS, FAILURE, RUNNING or "" where it was not ticked;
+    ``node_message`` to its last word. ``sent`` left the gate; ``proposed`` came from the tree.
+    ``believed`` (holes,) marks the attachments believed now. ``plan`` and ``plan_step`` (0-based)
+    say what is carried out.
+    """
+
+    tick: int
+    time_s: float
+    observation: Observation
+    twin: TissueState | None
+    reading: MonitorReading | None
+    force_n: float
+    true_force_n: float | None
+    true_surface: Surface | None
+    rate: float
+    proposed: Command
+    sent: Command
+    believed: NDArray[np.bool_]
+    node_status: Mapping[str, str]
+    node_message: Mapping[str, str]
+    plan: Plan | None
+    plan_step: int
+    events: tuple[Event, ...] = ()
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """What is known of a run before its first tick.
+
+    ``tree_paths`` lists (path, kind) of every node at the start. ``actual`` is None where nobody
+    knows it. ``versions``: package to version.
+    """
+
+    scene: Scene
+    scene_file: str
+    actual: Scene | None
+    actual_file: str | None
+    world: str
+    tree: str
+    seed: int
+    metric: str
+    force_threshold_n: float
+    tree_paths: tuple[tuple[str, str], ...]
+    versions: Mapping[str, str]
+    believed: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """The content of run.json; keys as in the documentation of recordings."""
+
+    values: Mapping[str, Any]
+
+
+class Recorder(Protocol):
+    """Receives a run tick by tick; what it received so far stays readable whatever happens."""
+
+    def start(self, info: RunInfo) -> None: ...
+
+    def tick(self, record: TickRecord) -> None: ...
+
+    def finish(self, summary: RunSummary) -> None:
+        """Called once, after the last tick or after a failure."""

@@ -1,0 +1,1 @@
+"""The simulated side: everything that predicts or imitates the physical world."""

@@ -1,0 +1,1 @@
+"""Worlds: something that takes motion commands and gives sensor readings."""

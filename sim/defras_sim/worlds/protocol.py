@@ -1,0 +1,122 @@
+"""What every world gives and takes, simulated or real. Tissue frame, SI units, world time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defras_sim.geometry import Floats, Pose
+from defras_sim.surface import Surface
+
+ArmName = Literal["psm1", "psm2"]
+
+JAW_OPEN_RAD = 0.8
+JAW_CLOSED_RAD = 0.0
+
+
+@dataclass(frozen=True)
+class ArmObservation:
+    """One arm as measured. The tip is the point midway between the jaw's ends.
+
+    ``joints`` and ``setpoint_joints`` (6,): yaw, pitch [rad], insertion [m], roll, wrist pitch,
+    wrist yaw [rad]; None for a world without joints. ``grasped`` is None where nothing tells.
+    """
+
+    stamp_s: float
+    tissue_from_tip: Pose
+    setpoint_tissue_from_tip: Pose
+    jaw_rad: float
+    grasped: bool | None = None
+    joints: Floats | None = None
+    setpoint_joints: Floats | None = None
+
+
+@dataclass(frozen=True)
+class PointCloud:
+    """Points (n, 3) seen on the tissue, in the tissue frame."""
+
+    stamp_s: float
+    points_m: Floats
+
+
+@dataclass(frozen=True)
+class CameraImage:
+    """A picture. ``rgb`` (h, w, 3) uint8; ``depth_m`` (h, w) distance along the optical axis.
+
+    ``intrinsics`` (3, 3); ``tissue_from_camera`` with the camera looking along +z, x right, y down.
+    ``depth_m`` is None for a plain endoscope and NaN where nothing was hit.
+    """
+
+    stamp_s: float
+    rgb: NDArray[np.uint8]
+    depth_m: Floats | None
+    intrinsics: Floats
+    tissue_from_camera: Pose
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Everything sensed at one tick. A world fills in what it has; the rest is None.
+
+    ``cloud`` and ``roi_visibility`` come ready-made only from worlds without pictures; from
+    pictures, sensing makes them.
+    """
+
+    time_s: float
+    arms: Mapping[ArmName, ArmObservation]
+    cloud: PointCloud | None = None
+    depth_image: CameraImage | None = None
+    endoscope_image: CameraImage | None = None
+    roi_visibility: float | None = None
+    roi_visibility_stamp_s: float | None = None
+
+
+@dataclass(frozen=True)
+class ArmCommand:
+    """Velocity of the tip in the tissue frame for the next tick, and where the jaw should go.
+
+    ``jaw_rad`` None keeps the jaw as it is.
+    """
+
+    linear_m_s: Floats = field(default_factory=lambda: np.zeros(3))
+    angular_rad_s: Floats = field(default_factory=lambda: np.zeros(3))
+    jaw_rad: float | None = None
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command per arm; an arm that is not named holds still with its grip as it is."""
+
+    arms: Mapping[ArmName, ArmCommand] = field(default_factory=dict)
+
+
+HOLD = Command()
+
+
+class World(Protocol):
+    """A place to operate in. One tick: ``observe``, decide, ``command``, ``step``."""
+
+    name: str
+    tick_s: float
+
+    def observe(self) -> Observation:
+        """The latest sensor readings; the same object twice if no time passed."""
+
+    def command(self, command: Command) -> None:
+        """Set the motion of the coming tick. It ends with the tick: silence is a hold."""
+
+    def step(self) -> None:
+        """Let ``tick_s`` of world time pass."""
+
+    def true_force_n(self) -> float | None:
+        """Largest true grasp force, for scoring only; None where nobody knows it."""
+
+    def true_surface(self) -> Surface | None:
+        """The actual tissue, for pictures only; None where nobody knows it."""
+
+    def close(self) -> None:
+        """Let go of all resources; motion is zero from here on."""

@@ -1,0 +1,139 @@
+"""YAML files checked against pydantic models: every fault of a file at once, as file:line:column."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+Location = tuple[str | int, ...]
+Model = TypeVar("Model", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong with a file, and what would be valid. Line and column count from 1."""
+
+    file: Path
+    line: int
+    column: int
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}: {self.message}"
+
+
+class InvalidFile(ValueError):
+    """A file that cannot be used; ``faults`` lists everything that is wrong with it."""
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("\n".join(str(fault) for fault in self.faults))
+
+
+@dataclass(frozen=True)
+class YamlSource:
+    """Plain data of a YAML file and the place (file, line, column) where each node stands."""
+
+    file: Path
+    data: Any
+    places: Mapping[Location, tuple[Path, int, int]]
+
+    def fault(self, location: Sequence[str | int], message: str) -> Fault:
+        """A fault at ``location``, or at its nearest ancestor that stands in the file."""
+        where = tuple(location)
+        while where and where not in self.places:
+            where = where[:-1]
+        return Fault(*self.places.get(where, (self.file, 1, 1)), message)
+
+    def validate(self, model: type[Model]) -> Model:
+        """Check the data against ``model``.
+
+        Raises:
+            InvalidFile: with one fault for each thing pydantic objects to.
+        """
+        try:
+            return model.model_validate(self.data)
+        except ValidationError as error:
+            raise InvalidFile(
+                self.fault(item["loc"], _worded(item["loc"], item["msg"], item.get("input")))
+                for item in error.errors()
+            ) from error
+
+
+def read_yaml(file: Path) -> YamlSource:
+    """Read a YAML 1.2 file.
+
+    Raises:
+        InvalidFile: the file cannot be read, is not UTF-8, is not YAML, or is not a mapping.
+    """
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidFile([Fault(file, 1, 1, f"cannot be read: {error}")]) from error
+    try:
+        document = YAML(typ="rt", pure=True).load(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+        message = f"not valid YAML: {error.problem or error.context}"
+        raise InvalidFile([Fault(file, line, column, message)]) from error
+    except (YAMLError, ValueError, RecursionError) as error:
+        raise InvalidFile([Fault(file, 1, 1, f"not valid YAML: {error}")]) from error
+    if not isinstance(document, CommentedMap):
+        raise InvalidFile([Fault(file, 1, 1, "should hold a mapping of keys to values at the top")])
+    places: dict[Location, tuple[Path, int, int]] = {(): (file, 1, 1)}
+    data = _collect(document, (), file, places)
+    return YamlSource(file, data, places)
+
+
+def overlay(base: YamlSource, top: YamlSource) -> YamlSource:
+    """``base`` with the mappings of ``top`` laid over it, key by key; lists are replaced whole."""
+    places = {key: place for key, place in base.places.items() if not _replaced(key, top.data)}
+    return YamlSource(top.file, _merge(base.data, top.data), {**places, **top.places})
+
+
+def _merge(base: Any, top: Any) -> Any:
+    if isinstance(base, dict) and isinstance(top, dict):
+        return {**base, **{key: _merge(base.get(key), value) for key, value in top.items()}}
+    return top
+
+
+def _replaced(key: Location, top: Any) -> bool:
+    """Whether ``key`` of the base lies at or under something that the top file replaces."""
+    for part in key:
+        if not isinstance(top, dict) or part not in top:
+            return not isinstance(top, dict)
+        top = top[part]
+    return not isinstance(top, dict)
+
+
+def _collect(node: Any, where: Location, file: Path, places: dict[Location, Any]) -> Any:
+    if isinstance(node, CommentedMap):
+        for key in node:
+            line, column = node.lc.key(key)
+            places[(*where, key)] = (file, line + 1, column + 1)
+        return {key: _collect(value, (*where, key), file, places) for key, value in node.items()}
+    if isinstance(node, CommentedSeq):
+        for index in range(len(node)):
+            line, column = node.lc.item(index)
+            places[(*where, index)] = (file, line + 1, column + 1)
+        return [_collect(item, (*where, i), file, places) for i, item in enumerate(node)]
+    # ruamel's scalar subclasses (positions, quoting) become plain Python values.
+    for plain in (bool, int, float, str):
+        if isinstance(node, plain):
+            return plain(node)
+    return node
+
+
+def _worded(location: Sequence[str | int], message: str, value: Any) -> str:
+    path = ".".join(str(part) for part in location) or "file"
+    message = message.removeprefix("Value error, ")
+    shown = "" if isinstance(value, (dict, list, BaseModel)) else f" (got {value!r})"
+    return f"{path}: {message}{shown}"
