@@ -1,7 +1,7 @@
 """Scene: the YAML description of one patient and set-up, as believed (or as it really is).
 
-Frames: the tissue frame has its origin at the centre of the tissue's rest *upper* surface, z up; the
-x-z plane divides the two arms' sides. In simulation the tissue frame is also the world frame.
+Frames: the tissue frame has its origin at the centre of the tissue's rest *upper* surface, z up;
+the x-z plane divides the two arms' sides. In simulation it is also the world frame.
 """
 
 from __future__ import annotations
@@ -135,7 +135,9 @@ class Simulation(Part):
     bullet_damping: Positive = 0.002
 
 
-_ARMS = {
+ArmName = Literal["psm1", "psm2"]
+
+_ARMS: dict[ArmName, Arm] = {
     "psm1": Arm(rcm_m=(0.0, 0.09, 0.20), home_tip_m=(-0.02, 0.07, 0.06), side="+y"),
     "psm2": Arm(rcm_m=(0.0, -0.09, 0.20), home_tip_m=(-0.02, -0.07, 0.06), side="-y"),
 }
@@ -151,7 +153,7 @@ class Scene(Part):
     attachments: Attachments
     grasp: GraspGrid = GraspGrid()
     roi: Roi
-    arms: dict[Literal["psm1", "psm2"], Arm] = Field(default_factory=lambda: dict(_ARMS))
+    arms: dict[ArmName, Arm] = Field(default_factory=lambda: dict(_ARMS))
     endoscope: Camera = Camera(position_m=(-0.17, 0.0, 0.12), target_m=(0.0, 0.0, 0.0))
     depth_camera: Camera = Camera(
         position_m=(0.17, 0.0, 0.20), target_m=(0.0, 0.0, 0.0), noise_sd_m=0.0005

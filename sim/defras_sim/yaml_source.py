@@ -1,4 +1,4 @@
-"""YAML files checked against pydantic models: every fault of a file at once, as file:line:column."""
+"""YAML files checked against pydantic models: all faults at once, as file:line:column."""
 
 from __future__ import annotations
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defras_sim.geometry import Floats, Pose
+from defras_sim.scene import ArmName
 from defras_sim.surface import Surface
-
-ArmName = Literal["psm1", "psm2"]
 
 JAW_OPEN_RAD = 0.8
 JAW_CLOSED_RAD = 0.0

@@ -1,0 +1,36 @@
+"""Where each manoeuvre takes the held tissue. The executive and the simulated rehearsal share it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from defras_sim.geometry import Floats
+from defras_sim.scene import Scene
+
+
+def away_from_endoscope(scene: Scene) -> Floats:
+    """Unit vector (3,) in the tissue plane along which the endoscope looks."""
+    looking = np.subtract(scene.endoscope.target_m, scene.endoscope.position_m)
+    looking[2] = 0.0
+    length = float(np.linalg.norm(looking))
+    if length < 1e-9:
+        raise ValueError("the endoscope looks straight down: no direction leads away from it")
+    return looking / length
+
+
+def manoeuvre_target_m(scene: Scene, manoeuvre: str, tip_m: Floats) -> Floats:
+    """Tip position (3,) at the end of ``pull``, ``move`` or ``fold`` when it starts at ``tip_m``.
+
+    Pull lifts straight up; move goes planarly towards the region of interest, at most over its
+    centre; fold moves away from the endoscope.
+    """
+    if manoeuvre == "pull":
+        return np.array([tip_m[0], tip_m[1], scene.motion.pull_height_m])
+    if manoeuvre == "move":
+        towards = scene.roi_center_m[:2] - tip_m[:2]
+        distance = float(np.linalg.norm(towards))
+        share = min(1.0, scene.motion.move_limit_m / distance) if distance > 1e-9 else 0.0
+        return tip_m + np.array([*(towards * share), 0.0])
+    if manoeuvre == "fold":
+        return tip_m + scene.motion.fold_distance_m * away_from_endoscope(scene)
+    raise ValueError(f"unknown manoeuvre {manoeuvre!r}; valid: pull, move, fold")
