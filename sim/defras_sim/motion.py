@@ -1,4 +1,4 @@
-"""Where each manoeuvre takes the held tissue. The executive and the simulated rehearsal share it."""
+"""Where each manoeuvre takes the held tissue; executive and simulated rehearsal share it."""
 
 from __future__ import annotations
 
