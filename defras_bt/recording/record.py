@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -24,12 +24,16 @@ class Event:
     """Something worth telling: a sentence that a surgeon understands, and a kind for counting.
 
     Kinds: start, plan, action, warning, force, learning, replan, goal, human, error, hold, end.
+    One event of kind ``action`` is one action begun, of kind ``replan`` one new plan asked for, of
+    kind ``learning`` one attachment update tried. ``data`` holds what a program counts or draws:
+    ``learning`` says ``{"adopted": bool}``.
     """
 
     time_s: float
     kind: str
     level: Level
     sentence: str
+    data: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
