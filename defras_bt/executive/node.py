@@ -1,0 +1,101 @@
+"""Base class of every leaf of a behaviour tree."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import py_trees
+from py_trees.common import Status
+from pydantic import BaseModel, ConfigDict
+
+if TYPE_CHECKING:
+    from defras_bt.executive.context import Context
+
+Role = Literal["guard", "motion", "recovery", "task"]
+"""What a leaf is for.
+
+guard: says whether motion may go on; answers at once and fails closed. motion: proposes a command
+for an arm. recovery: repairs what made a guard trip. task: everything else.
+"""
+
+_CODE = re.compile(r"[a-z][a-z0-9_]*")
+
+
+class NodeParameters(BaseModel):
+    """What a tree file may say about a leaf: unknown keys, infinities and NaN are faults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class NoParameters(NodeParameters):
+    """Parameters of a leaf that has none."""
+
+
+class UnreportedStatus(RuntimeError):
+    """A leaf ended its tick with a status that it gave no code and message for."""
+
+
+class Node(py_trees.behaviour.Behaviour):
+    """A leaf that always says why: every status comes with a code and a message.
+
+    A subclass sets ``role`` and, where it has any, ``Parameters``; it implements ``update()`` and
+    ends every way through it with :meth:`succeed`, :meth:`fail` or :meth:`run`. ``initialise()`` is
+    called on the first tick of each new activity; ``terminate()`` when the activity ends, also when
+    a guard pre-empts it. ``terminate()`` must never command motion: a pre-empted action is
+    terminated *after* the branch that took over was ticked, so it would have the last word.
+
+    Attributes:
+        code: short snake_case reason of the last status, for counting and recovery ("no_cloud").
+        feedback_message: the same for people, with numbers and units.
+        reported_status: the last status given by ``update()``. Pre-emption resets ``status`` to
+            INVALID; this, the code and the message stay, so that a recorder can still tell.
+    """
+
+    role: ClassVar[Role]
+    Parameters: ClassVar[type[BaseModel]] = NoParameters
+
+    def __init__(self, name: str, context: Context, parameters: BaseModel) -> None:
+        super().__init__(name)
+        self.context = context
+        self.parameters = parameters
+        self.code = ""
+        self.reported_status = Status.INVALID
+        self._reported = False
+
+    def succeed(self, code: str, message: str) -> Status:
+        """Report SUCCESS: done, or (guard) motion may go on."""
+        return self._report(Status.SUCCESS, code, message)
+
+    def fail(self, code: str, message: str) -> Status:
+        """Report FAILURE: not possible, or (guard) motion must stop."""
+        return self._report(Status.FAILURE, code, message)
+
+    def run(self, code: str, message: str) -> Status:
+        """Report RUNNING: under way, tick again."""
+        return self._report(Status.RUNNING, code, message)
+
+    def tick(self) -> Iterator[py_trees.behaviour.Behaviour]:
+        """Tick as py_trees does, and refuse a status that ``update()`` did not report.
+
+        Raises:
+            UnreportedStatus: ``update()`` returned without succeed(), fail() or run().
+        """
+        self._reported = False
+        for node in super().tick():
+            if not self._reported or self.status != self.reported_status:
+                raise UnreportedStatus(
+                    f"{type(self).__name__} {self.name!r} returned {self.status} without a reason; "
+                    "end update() with return self.succeed(...), self.fail(...) or self.run(...)"
+                )
+            yield node
+
+    def _report(self, status: Status, code: str, message: str) -> Status:
+        if not _CODE.fullmatch(code):
+            raise ValueError(f"{type(self).__name__}: code {code!r} should be snake_case")
+        if not message:
+            raise ValueError(f"{type(self).__name__}: code {code!r} needs a message for people")
+        self.code, self.feedback_message = code, message
+        self.reported_status, self._reported = status, True
+        return status
