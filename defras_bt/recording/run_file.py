@@ -1,0 +1,70 @@
+"""The schema of ``run.json``. ``run.schema.json`` beside this file is printed from it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+SCHEMA_FILE = Path(__file__).with_name("run.schema.json")
+
+Outcome = Literal["goal", "not_reached", "human", "error"]
+Count = Annotated[int, Field(ge=0)]
+Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Newton = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+
+
+class AttachmentUpdates(BaseModel):
+    """Updates of the believed attachments."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    tried: Count = Field(description="proposals that were judged")
+    adopted: Count = Field(description="proposals that replaced the belief")
+
+
+class Warnings(BaseModel):
+    """How often the warning state rose to 1, 2 and 3 (with the metric that the tree acts on)."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+    state_1: Count = Field(alias="1")
+    state_2: Count = Field(alias="2")
+    state_3: Count = Field(alias="3")
+
+
+class RunFile(BaseModel):
+    """What one run came to."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, title="run.json")
+    outcome: Outcome = Field(description="goal, not_reached, human (asked for) or error")
+    roi_visibility: Share | None = Field(description="share of the region seen at the end")
+    actions: Count = Field(description="actions begun")
+    replans: Count = Field(description="new plans asked for after the first")
+    warnings: Warnings
+    attachment_updates: AttachmentUpdates
+    force_threshold_n: Newton = Field(description="epsilon")
+    force_max_n: Newton | None = Field(description="largest grasp force that the twin estimated")
+    force_mean_n: Newton | None = Field(description="mean of the estimate over ticks above 0")
+    force_max_true_n: Newton | None = Field(description="largest true grasp force; null if unknown")
+    time_over_threshold_s: Seconds = Field(description="world time with the estimate over epsilon")
+    ticks_over_threshold: Count
+    duration_s: Seconds = Field(description="world time from the first tick to the last")
+    wall_s: Seconds = Field(description="time that passed on the wall meanwhile")
+    seed: int
+    scene: str = Field(description="scene file, what was believed")
+    actual: str | None = Field(description="scene file of what was really there; null if unknown")
+    world: str
+    tree: str
+    versions: dict[str, str]
+
+
+def run_schema() -> dict[str, Any]:
+    """JSON schema (draft 2020-12) of ``run.json``."""
+    schema = RunFile.model_json_schema(by_alias=True)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def schema_text() -> str:
+    return json.dumps(run_schema(), indent=2) + "\n"
