@@ -1,0 +1,150 @@
+"""What the ASP programs are told about a scene and a situation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from clingo import Function, Number, Symbol, Tuple_
+from numpy.typing import NDArray
+
+from defras_bt.planning.plan import MANOEUVRES, GridPoint, Situation
+from defras_sim.scene import Scene
+
+_SIDES = {"+y": "plus", "-y": "minus"}
+
+
+def grid_points(scene: Scene) -> tuple[GridPoint, ...]:
+    """All grasp points, row by row from (1, 1)."""
+    grid = scene.grasp
+    return tuple((c, r) for r in range(1, grid.rows + 1) for c in range(1, grid.columns + 1))
+
+
+def reaching_arms(scene: Scene, point: GridPoint) -> tuple[str, ...]:
+    """The arms on whose side of the x-z plane the point lies; both if it lies on the plane."""
+    y_mm = _mm_outwards(scene.grasp_xy_m(*point)[1])
+    return tuple(
+        name for name, arm in scene.arms.items() if (y_mm >= 0 if arm.side == "+y" else y_mm <= 0)
+    )
+
+
+def roi_distances_mm(scene: Scene) -> dict[GridPoint, int]:
+    """From each grasp point to the centre of the region of interest, in the tissue plane."""
+    center = scene.roi_center_m[:2]
+    return {
+        point: round(1000 * float(np.linalg.norm(scene.grasp_xy_m(*point) - center)))
+        for point in grid_points(scene)
+    }
+
+
+def attachment_distances_mm(scene: Scene, attached: NDArray[np.bool_]) -> dict[GridPoint, int]:
+    """From each grasp point to the nearest hole believed to hold; empty if none is.
+
+    ``attached`` (holes,) in the order of ``scene.holes_xy_m``.
+    """
+    holes_xy_m = scene.holes_xy_m
+    if np.shape(attached) != (len(holes_xy_m),):
+        raise ValueError(
+            f"attached has shape {np.shape(attached)}; this scene has {len(holes_xy_m)} holes"
+        )
+    held_xy_m = holes_xy_m[np.asarray(attached, dtype=bool)]
+    if not len(held_xy_m):
+        return {}
+    return {
+        point: round(
+            1000 * float(np.linalg.norm(held_xy_m - scene.grasp_xy_m(*point), axis=1).min())
+        )
+        for point in grid_points(scene)
+    }
+
+
+def scene_facts(scene: Scene) -> str:
+    """Facts that never change: arms, grasp points, distances to the region of interest."""
+    lines = [
+        f"arm({name},{_SIDES[arm.side]},{rank})."
+        for rank, (name, arm) in enumerate(sorted(scene.arms.items()), start=1)
+    ]
+    to_roi = roi_distances_mm(scene)
+    for rank, point in enumerate(grid_points(scene)):
+        x_mm, y_mm = (_mm_outwards(value) for value in scene.grasp_xy_m(*point))
+        place = _text(point)
+        lines.append(f"grasp_point({place},{x_mm},{y_mm}).")
+        lines.append(f"distance_to_roi({place},{to_roi[point]}).")
+        lines.append(f"point_rank({place},{rank}).")
+    return "\n".join(lines)
+
+
+def belief_facts(distances_mm: dict[GridPoint, int]) -> str:
+    """Distances to the attachments believed in; the program fills in the belief's number k."""
+    return "\n".join(
+        f"distance_to_attachment({_text(point)},{distance},k)."
+        for point, distance in distances_mm.items()
+    )
+
+
+def world_atoms(
+    situation: Situation, exposing: Sequence[str], required: GridPoint | None
+) -> set[Symbol]:
+    """The external atoms that are true now. An arm that holds a point is at it."""
+    atoms = {Function("blocked", [point_symbol(point)]) for point in situation.blocked}
+    atoms |= {Function("exposing", [Function(name)]) for name in exposing}
+    if required is not None:
+        atoms.add(Function("required", [point_symbol(required)]))
+    for name, arm in situation.arms.items():
+        tool = Function(name)
+        place = arm.at if arm.holding is None else arm.holding
+        if place is not None:
+            atoms.add(_sensed("at", tool, point_symbol(place)))
+        if arm.holding is not None:
+            atoms.add(_sensed("holding", tool, point_symbol(arm.holding)))
+            atoms |= {_sensed("done", tool, Function(done)) for done in arm.done}
+        if arm.jaw_open:
+            atoms.add(_sensed("jaw_open", tool))
+    return atoms
+
+
+def require_valid(
+    scene: Scene, situation: Situation, exposing: Sequence[str], required: GridPoint | None
+) -> None:
+    """Raise ValueError, naming what would be valid, if the question does not fit the scene."""
+    if set(situation.arms) != set(scene.arms):
+        raise ValueError(
+            f"the situation describes arms {sorted(situation.arms)}; the scene has "
+            f"{sorted(scene.arms)}"
+        )
+    if not exposing:
+        raise ValueError(f"no manoeuvre would expose the region; name some of {MANOEUVRES}")
+    for name in [*exposing, *(done for arm in situation.arms.values() for done in arm.done)]:
+        if name not in MANOEUVRES:
+            raise ValueError(f"unknown manoeuvre {name!r}; valid: {', '.join(MANOEUVRES)}")
+    places: list[GridPoint | None] = [required, *situation.blocked]
+    places += [place for arm in situation.arms.values() for place in (arm.at, arm.holding)]
+    _require_on_grid(scene, (place for place in places if place is not None))
+
+
+def _require_on_grid(scene: Scene, points: Iterable[GridPoint]) -> None:
+    grid = scene.grasp
+    for column, row in points:
+        if not (1 <= column <= grid.columns and 1 <= row <= grid.rows):
+            raise ValueError(
+                f"({column},{row}) is no grasp point; valid are (1,1) to "
+                f"({grid.columns},{grid.rows})"
+            )
+
+
+def point_symbol(point: GridPoint) -> Symbol:
+    return Tuple_([Number(point[0]), Number(point[1])])
+
+
+def _sensed(name: str, *arguments: Symbol) -> Symbol:
+    return Function("sensed", [Function(name, list(arguments))])
+
+
+def _text(point: GridPoint) -> str:
+    return f"({point[0]},{point[1]})"
+
+
+def _mm_outwards(value_m: float) -> int:
+    """Millimetres, rounded away from 0: only a point on the plane itself gets 0."""
+    return int(math.copysign(math.ceil(abs(value_m) * 1000 - 1e-6), value_m))
