@@ -17,7 +17,16 @@ from defras_bt.executive.node import Node, Role
 
 NodeClass = TypeVar("NodeClass", bound=type[Node])
 
-BUILTIN_NODE_MODULES: tuple[str, ...] = ()
+BUILTIN_NODE_MODULES: tuple[str, ...] = (
+    "defras_bt.acting.reach",
+    "defras_bt.acting.jaw",
+    "defras_bt.acting.manoeuvre",
+    "defras_bt.acting.let_go",
+    "defras_bt.monitoring.guards",
+    "defras_bt.learning.nodes",
+    "defras_bt.planning.nodes",
+    "defras_bt.executive.nodes",
+)
 """Modules whose import registers the nodes that come with this project."""
 
 ENTRY_POINT_GROUP = "defras.nodes"

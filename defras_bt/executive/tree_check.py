@@ -1,0 +1,62 @@
+"""What must hold of a tree as a whole: above all, that a guard stands before every motion."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+from defras_bt.executive.tree_spec import NodeSpec
+from defras_sim.yaml_source import Fault
+
+
+def check_tree(root: NodeSpec, guard_names: Collection[str]) -> Iterator[Fault]:
+    """Faults of a tree whose nodes are each well-formed.
+
+    ``guard_names``: classes that could be put before an unguarded motion, for the message.
+    """
+    yield from _unguarded(root, False, guard_names)
+    slots = [(path, spec) for path, spec in root.walk() if spec.kind == "plan_slot"]
+    for path, spec in slots[1:]:
+        yield Fault(
+            *spec.place,
+            f"a second plan_slot ({path}): a tree carries out one plan, at {slots[0][0]}",
+        )
+
+
+def moves(spec: NodeSpec) -> bool:
+    """Whether the node itself commands an arm: a motion leaf, or the place for a plan's actions."""
+    if spec.node_class is None:
+        return spec.kind == "plan_slot"
+    return spec.node_class.role == "motion"
+
+
+def guards(spec: NodeSpec) -> bool:
+    """Whether ``spec`` succeeds only in a tick in which a guard leaf under it succeeded.
+
+    Not so for ``sequence`` (does not look at a finished guard again), a parallel that needs one
+    success, and decorators: an inverted guard would let motion pass on missing data.
+    """
+    if spec.node_class is not None:
+        return spec.node_class.role == "guard"
+    if spec.kind == "reactive":
+        return any(map(guards, spec.children))
+    if spec.kind == "parallel":
+        return getattr(spec.options, "succeed_when", None) == "all" and any(
+            map(guards, spec.children)
+        )
+    if spec.kind in ("selector", "reactive_selector"):
+        return all(map(guards, spec.children))
+    return False
+
+
+def _unguarded(spec: NodeSpec, guarded: bool, guard_names: Collection[str]) -> Iterator[Fault]:
+    """Faults for what moves at or under ``spec``; ``guarded``: a guard stands before ``spec``."""
+    if moves(spec) and not guarded:
+        examples = ", ".join(sorted(guard_names)) or "none is registered"
+        yield Fault(
+            *spec.place,
+            f"{spec.kind} {spec.name!r} moves an arm and no guard stands before it; put it under a "
+            f"`reactive`, after a guard ({examples})",
+        )
+    for index, child in enumerate(spec.children):
+        before = spec.children[:index] if spec.kind == "reactive" else ()
+        yield from _unguarded(child, guarded or any(map(guards, before)), guard_names)
