@@ -14,7 +14,7 @@ from defras_bt.executive.composites import PlanSlot
 from defras_bt.executive.registry import NODES, Registry
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.executive.tree_kinds import KINDS, kind_of
-from defras_bt.executive.tree_spec import NodeSpec, TreeSpec
+from defras_bt.executive.tree_spec import MetricName, NodeSpec, TreeSpec
 
 if TYPE_CHECKING:
     from defras_bt.executive.context import Context
@@ -27,6 +27,7 @@ class LoadedTree:
     name: str
     root: Behaviour
     plan_slot: PlanSlot | None
+    metric: MetricName | None = None
 
     def paths(self) -> dict[UUID, str]:
         """Path of every behaviour now in the tree, by id, parents first.
@@ -54,7 +55,7 @@ def build_tree(tree: TreeSpec, context: Context) -> LoadedTree:
     """Make the behaviours of a tree that was read and checked."""
     root = _build(tree.root, context)
     slots = [behaviour for behaviour, _ in walk(root) if isinstance(behaviour, PlanSlot)]
-    return LoadedTree(tree.name, root, slots[0] if slots else None)
+    return LoadedTree(tree.name, root, slots[0] if slots else None, tree.metric)
 
 
 def walk(root: Behaviour, above: str = "") -> Iterator[tuple[Behaviour, str]]:

@@ -32,7 +32,7 @@ from defras_bt.executive.registry import NODES, Registry, did_you_mean, snake_ca
 from defras_bt.executive.tree_check import check_tree
 from defras_bt.executive.tree_fields import NAME_PATTERN, FieldChecker
 from defras_bt.executive.tree_kinds import KINDS, Kind
-from defras_bt.executive.tree_spec import NodeSpec, TreeSpec
+from defras_bt.executive.tree_spec import MetricName, NodeSpec, TreeSpec
 from defras_sim.yaml_source import Fault, InvalidFile, Location, read_yaml
 
 SUBTREE = "subtree"
@@ -47,6 +47,10 @@ class TreeHeader(NodeParameters):
 
     name: str = Field(pattern=NAME_PATTERN, description="Name of the tree and its topmost node.")
     description: str = Field(default="", description="What the tree does, for people.")
+    metric: MetricName | None = Field(
+        default=None,
+        description="The discrepancy whose warning states count; left out: no monitoring.",
+    )
     tree: Any = Field(description="The topmost node.")
 
 
@@ -95,7 +99,7 @@ class _Reader(FieldChecker):
         root = self.node(("tree",), self.source.data["tree"], self.depth, name)
         if header is None or root is None:
             return None
-        return TreeSpec(header.name, header.description, root)
+        return TreeSpec(header.name, header.description, root, header.metric)
 
     def node(
         self, at: Location, data: Any, depth: int, called: str | None = None

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from pydantic import BaseModel
 
 from defras_bt.executive.node import Node
+
+MetricName = Literal["local", "median"]
 
 Place = tuple[Path, int, int]
 """File, line and column; the latter two count from 1."""
@@ -38,8 +41,12 @@ class NodeSpec:
 
 @dataclass(frozen=True)
 class TreeSpec:
-    """A whole tree; ``root.name`` is ``name``."""
+    """A whole tree; ``root.name`` is ``name``.
+
+    ``metric`` names the discrepancy whose warning states count; None: a tree without monitoring.
+    """
 
     name: str
     description: str
     root: NodeSpec
+    metric: MetricName | None = None
