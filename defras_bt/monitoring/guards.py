@@ -1,0 +1,153 @@
+"""Guards: leaves that say whether motion may go on. They are ticked every tick and fail closed."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from py_trees.common import Status
+from pydantic import Field
+
+from defras_bt.executive.node import Node, NodeParameters, Role
+from defras_bt.executive.registry import register_node
+
+
+class Guard(Node):
+    """Base of the guards."""
+
+    role: ClassVar[Role] = "guard"
+
+
+class StateParameters(NodeParameters):
+    """A warning state, 0 to 3."""
+
+    state: Annotated[int, Field(ge=1, le=3)]
+
+
+class PatienceParameters(NodeParameters):
+    """``patience_s``: how long the force may stay over its threshold at half speed."""
+
+    patience_s: Annotated[float, Field(ge=0)] = 0.5
+
+
+class TravelParameters(NodeParameters):
+    """``travel_m``: motion of the tip after which there is something new to learn from."""
+
+    travel_m: Annotated[float, Field(gt=0)] = 0.005
+
+
+@register_node
+class SensorsFresh(Guard):
+    """Succeeds if every reading is there, a number, and young enough."""
+
+    def update(self) -> Status:
+        missing = self.context.board.inputs.missing
+        if missing:
+            return self.fail("stale", "; ".join(missing))
+        return self.succeed("fresh", "all readings are fresh")
+
+
+@register_node
+class OperatorPermits(Guard):
+    """Succeeds unless the operator asked to stop."""
+
+    def update(self) -> Status:
+        stop = self.context.board.inputs.operator_stop
+        return self.fail("stopped", stop) if stop else self.succeed("permitted", "no stop asked")
+
+
+@register_node
+class WarningBelow(Guard):
+    """Succeeds while the warning state is below ``state``; an unknown state is too high."""
+
+    Parameters = StateParameters
+    parameters: StateParameters
+
+    def update(self) -> Status:
+        state = self.context.board.warning_state
+        if state is None:
+            return self.fail("unknown", "the warning state is unknown")
+        if state >= self.parameters.state:
+            return self.fail("warned", f"warning state {state}")
+        return self.succeed("below", f"warning state {state}")
+
+
+@register_node
+class WarningReached(Guard):
+    """Succeeds if the warning state is known to be ``state`` or higher."""
+
+    Parameters = StateParameters
+    parameters: StateParameters
+
+    def update(self) -> Status:
+        state = self.context.board.warning_state
+        if state is None or state < self.parameters.state:
+            return self.fail("below", f"warning state {'unknown' if state is None else state}")
+        return self.succeed("reached", f"warning state {state}")
+
+
+@register_node
+class ForceAccepted(Guard):
+    """Succeeds unless the estimated force stayed over its threshold, or is unknown, too long."""
+
+    Parameters = PatienceParameters
+    parameters: PatienceParameters
+
+    def update(self) -> Status:
+        board = self.context.board
+        force_n, limit_n = board.inputs.force_n, board.inputs.force_threshold_n
+        if np.isnan(force_n):
+            return self.fail("unknown", "the force is unknown")
+        if board.force_over_s >= self.parameters.patience_s:
+            return self.fail(
+                "too_high",
+                f"{force_n:.2f} N, over {limit_n:.2f} N for {board.force_over_s:.2f} s",
+            )
+        return self.succeed("accepted", f"{force_n:.2f} N of {limit_n:.2f} N")
+
+
+@register_node
+class RegionVisible(Guard):
+    """Succeeds if enough of the region of interest is seen."""
+
+    def update(self) -> Status:
+        seen = self.context.board.inputs.observation.roi_visibility
+        wanted = self.context.scene.thresholds.roi_visibility
+        if seen is None or not seen >= wanted:
+            share = "unknown" if seen is None else f"{seen:.0%}"
+            return self.fail("hidden", f"visible: {share}, wanted: {wanted:.0%}")
+        return self.succeed("visible", f"visible: {seen:.0%}")
+
+
+@register_node
+class RestCalibrated(Guard):
+    """Succeeds once monitoring knows what no discrepancy looks like."""
+
+    def update(self) -> Status:
+        if self.context.board.rest_calibrated:
+            return self.succeed("calibrated", "rest frames are known")
+        return self.fail("not_calibrated", "rest frames are still to be seen")
+
+
+@register_node
+class LearningDue(Guard):
+    """Succeeds if there is something new to learn from since the last attempt."""
+
+    Parameters = TravelParameters
+    parameters: TravelParameters
+
+    def update(self) -> Status:
+        board = self.context.board
+        if not board.grips:
+            return self.fail("nothing_held", "nothing is held: the shape says nothing new")
+        state = board.warning_state
+        last = board.last_learning
+        if last is None or (state is not None and state > last.warning_state):
+            return self.succeed("due", "not tried at this warning state yet")
+        travel_m = max(
+            float(np.linalg.norm(arm.tissue_from_tip.position_m - last.tips_m[name]))
+            for name, arm in board.inputs.observation.arms.items()
+        )
+        if travel_m >= self.parameters.travel_m:
+            return self.succeed("due", f"moved {travel_m * 1e3:.1f} mm since the last attempt")
+        return self.fail("not_due", f"moved only {travel_m * 1e3:.1f} mm since the last attempt")

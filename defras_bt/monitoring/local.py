@@ -1,0 +1,55 @@
+"""The worst smoothed neighbourhood of the point-to-surface distance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from defras_bt.monitoring.closest import closest_on_triangles
+from defras_bt.monitoring.metric import Measurement
+from defras_bt.monitoring.seen import SeenSurface
+from defras_sim.geometry import Floats
+
+
+@dataclass(frozen=True)
+class LocalMetric:
+    """Distance of each point to the visible simulated surface, smoothed; the worst counts.
+
+    A point's smoothed distance is the median over its neighbourhood, a ball of ``diameter_m``:
+    up to half of the neighbours may be outliers, such as a few points on an instrument or at the
+    rim of an occlusion. Points with fewer than ``min_neighbours`` (themselves included) say
+    nothing; if most points are like that, the value is NaN, for a cloud so thin hides mismatch.
+
+    The opposite direction, simulated surface without observed points near it, is left out on
+    purpose: only what the twin holds for visible is compared, so tissue missing where the twin
+    has some uncovers points, in the same line of sight, that the twin holds for hidden, and those
+    are far from anything visible. What it would add are false alarms behind instruments.
+    """
+
+    diameter_m: float = 0.015
+    min_neighbours: int = 5
+    max_neighbours: int = 24
+    name: str = "local"
+
+    def measure(self, cloud_m: Floats, seen: SeenSurface) -> Measurement:
+        if len(cloud_m) < self.min_neighbours or len(seen.corners_m) == 0:
+            return Measurement(float("nan"), np.full(len(cloud_m), np.nan))
+        distance = closest_on_triangles(cloud_m, seen.corners_m).distance_m
+        smooth = self.smoothed_m(cloud_m, distance)
+        known = np.isfinite(smooth)
+        worst = float(smooth[known].max()) if known.mean() > 0.5 else float("nan")
+        return Measurement(worst, distance)
+
+    def smoothed_m(self, cloud_m: Floats, distance_m: Floats) -> Floats:
+        """Median of ``distance_m`` (n,) over each point's neighbourhood, NaN where too few."""
+        neighbours = min(self.max_neighbours, len(cloud_m))
+        _, index = cKDTree(cloud_m).query(
+            cloud_m, neighbours, distance_upper_bound=self.diameter_m / 2
+        )
+        values = np.sort(np.append(distance_m, np.inf)[index], axis=1)
+        count = np.sum(index < len(cloud_m), axis=1)
+        each = np.arange(len(cloud_m))
+        median = (values[each, (count - 1) // 2] + values[each, count // 2]) / 2
+        return np.where(count >= self.min_neighbours, median, np.nan)

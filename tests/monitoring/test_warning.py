@@ -1,0 +1,118 @@
+"""Warning states over a sequence of ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from defras_bt.monitoring.warning import WarningMonitor
+from defras_sim.geometry import Floats
+from defras_sim.scene import Scene
+from defras_sim.surface import Surface
+from defras_sim.worlds.protocol import PointCloud
+
+Slab = Callable[..., Surface]
+Take = Callable[[Surface, int], Floats]
+
+
+@pytest.fixture
+def rested(slab: Slab, take_cloud: Take, scene: Scene) -> WarningMonitor:
+    monitor = WarningMonitor(scene)
+    for frame in range(10):
+        monitor.observe_rest(PointCloud(0.1 * frame, take_cloud(slab(), frame)), slab())
+    return monitor
+
+
+def raised(height_m: float) -> Callable[[Floats], Floats]:
+    return lambda points: points + [0.0, 0.0, height_m]
+
+
+def test_rest_frames_raise_no_warning(rested: WarningMonitor, slab: Slab, take_cloud: Take) -> None:
+    for frame in range(40):
+        time = 2.0 + 0.1 * frame
+        reading = rested.reading(PointCloud(time, take_cloud(slab(), 100 + frame)), slab(), time)
+        assert reading.warning_state == {"local": 0, "median": 0}
+        assert reading.mu_m["local"] < 0.0005
+        assert reading.mu_m["median"] < 0.0005
+    assert len(reading.per_point_m) > 500
+
+
+@pytest.mark.parametrize(("height_mm", "state"), [(1, 0), (3, 1), (5, 2), (9, 3)])
+def test_states_follow_the_thresholds(
+    rested: WarningMonitor, slab: Slab, take_cloud: Take, height_mm: int, state: int
+) -> None:
+    shape = slab(raised(height_mm * 1e-3))
+    for frame in range(2):
+        time = 2.0 + 0.1 * frame
+        reading = rested.reading(PointCloud(time, take_cloud(shape, frame)), slab(), time)
+    assert reading.warning_state["local"] == state
+
+
+def test_one_bad_frame_is_not_believed(
+    rested: WarningMonitor, slab: Slab, take_cloud: Take
+) -> None:
+    heights = [0.0, 0.008, 0.0, 0.008, 0.008]
+    states = []
+    for frame, height in enumerate(heights):
+        cloud = PointCloud(2.0 + 0.1 * frame, take_cloud(slab(raised(height)), frame))
+        states.append(rested.reading(cloud, slab(), cloud.stamp_s).warning_state["local"])
+    assert states == [0, 0, 0, 0, 3]
+
+
+def test_a_cloud_seen_before_confirms_nothing(
+    rested: WarningMonitor, slab: Slab, take_cloud: Take
+) -> None:
+    bad = PointCloud(2.0, take_cloud(slab(raised(0.008)), 1))
+    first = rested.reading(bad, slab(), 2.0)
+    assert rested.reading(bad, slab(), 2.05) is first
+    assert first.warning_state["local"] == 0
+
+
+def test_a_cloud_is_compared_with_the_twin_at_its_own_time(
+    rested: WarningMonitor, slab: Slab, take_cloud: Take
+) -> None:
+    for tick in range(4):
+        time = 2.0 + 0.05 * tick
+        rested.reading(None, slab(raised(0.1 * (time - 2.0))), time)
+    cloud = PointCloud(2.075, take_cloud(slab(raised(0.0075)), 1))
+    reading = rested.reading(cloud, slab(raised(0.02)), 2.2)
+    assert reading.mu_m["local"] < 0.0005
+
+
+def test_without_a_cloud_mu_is_nan_and_the_state_stays(
+    rested: WarningMonitor, slab: Slab, take_cloud: Take
+) -> None:
+    for frame in range(2):
+        cloud = PointCloud(2.0 + 0.1 * frame, take_cloud(slab(raised(0.005)), frame))
+        rested.reading(cloud, slab(), cloud.stamp_s)
+    blind = rested.reading(None, slab(), 2.3)
+    assert np.isnan(list(blind.mu_m.values())).all()
+    assert blind.warning_state["local"] == 2
+    thin = rested.reading(PointCloud(2.4, cloud.points_m[:3]), slab(), 2.4)
+    assert np.isnan(thin.mu_m["local"])
+    assert thin.warning_state["local"] == 2
+
+
+def test_before_calibration_nothing_can_be_said(slab: Slab, take_cloud: Take, scene: Scene) -> None:
+    monitor = WarningMonitor(scene)
+    cloud = PointCloud(0.0, take_cloud(slab(), 0))
+    assert np.isnan(monitor.reading(cloud, slab(), 0.0).mu_m["local"])
+    assert not monitor.observe_rest(None, slab())
+    ready = [monitor.observe_rest(cloud, slab()) for _ in range(10)]
+    assert not any(ready)  # the same cloud over and over is one frame
+
+
+def test_a_changed_twin_starts_with_a_clean_slate(
+    rested: WarningMonitor, slab: Slab, take_cloud: Take
+) -> None:
+    shape = slab(raised(0.005))
+    for frame in range(2):
+        time = 2.0 + 0.1 * frame
+        reading = rested.reading(PointCloud(time, take_cloud(shape, frame)), slab(), time)
+    assert reading.warning_state["local"] == 2
+    rested.twin_changed()
+    reading = rested.reading(PointCloud(2.1, take_cloud(shape, 1)), shape, 2.1)
+    assert reading.warning_state["local"] == 0
+    assert reading.mu_m["local"] < 0.0005
