@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 Location = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
+
+_UNREADABLE = (YAMLError, ValueError, RecursionError)
+_MALFORMED_TAG = (AttributeError, KeyError, IndexError, TypeError)
+"""What ruamel trips over where the value does not suit an explicit tag, as in `!!int ""`."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +68,7 @@ class YamlSource:
             return model.model_validate(self.data)
         except ValidationError as error:
             raise InvalidFile(
-                self.fault(item["loc"], _worded(item["loc"], item["msg"], item.get("input")))
-                for item in error.errors()
+                self.fault(item["loc"], _worded(model, item)) for item in error.errors()
             ) from error
 
 
@@ -84,7 +89,7 @@ def read_yaml(file: Path) -> YamlSource:
         line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
         message = f"not valid YAML: {error.problem or error.context}"
         raise InvalidFile([Fault(file, line, column, message)]) from error
-    except (YAMLError, ValueError, RecursionError) as error:
+    except (*_UNREADABLE, *_MALFORMED_TAG) as error:
         raise InvalidFile([Fault(file, 1, 1, f"not valid YAML: {error}")]) from error
     if not isinstance(document, CommentedMap):
         raise InvalidFile([Fault(file, 1, 1, "should hold a mapping of keys to values at the top")])
@@ -117,13 +122,11 @@ def _replaced(key: Location, top: Any) -> bool:
 def _collect(node: Any, where: Location, file: Path, places: dict[Location, Any]) -> Any:
     if isinstance(node, CommentedMap):
         for key in node:
-            line, column = node.lc.key(key)
-            places[(*where, key)] = (file, line + 1, column + 1)
+            places[(*where, key)] = (file, *_position(node, node.lc.key, key))
         return {key: _collect(value, (*where, key), file, places) for key, value in node.items()}
     if isinstance(node, CommentedSeq):
         for index in range(len(node)):
-            line, column = node.lc.item(index)
-            places[(*where, index)] = (file, line + 1, column + 1)
+            places[(*where, index)] = (file, *_position(node, node.lc.item, index))
         return [_collect(item, (*where, i), file, places) for i, item in enumerate(node)]
     # ruamel's scalar subclasses (positions, quoting) become plain Python values.
     for plain in (bool, int, float, str):
@@ -132,8 +135,42 @@ def _collect(node: Any, where: Location, file: Path, places: dict[Location, Any]
     return node
 
 
-def _worded(location: Sequence[str | int], message: str, value: Any) -> str:
+def _position(
+    node: CommentedMap | CommentedSeq, find: Callable[[Any], tuple[int, int]], key: Any
+) -> tuple[int, int]:
+    """Line and column of an entry; of the whole node where the entry was merged in by `<<`."""
+    try:
+        line, column = find(key)
+    except (KeyError, TypeError):
+        line, column = node.lc.line or 0, node.lc.col or 0
+    return line + 1, column + 1
+
+
+def _worded(model: type[BaseModel], item: ErrorDetails) -> str:
+    location, value = item["loc"], item.get("input")
     path = ".".join(str(part) for part in location) or "file"
-    message = message.removeprefix("Value error, ")
+    if item["type"] == "extra_forbidden":
+        return f"{path}: unknown key; {_valid_keys(model, location)}"
+    message = item["msg"].removeprefix("Value error, ")
     shown = "" if isinstance(value, (dict, list, BaseModel)) else f" (got {value!r})"
     return f"{path}: {message}{shown}"
+
+
+def _valid_keys(model: type[BaseModel], location: Sequence[str | int]) -> str:
+    """The keys that may stand where ``location`` ends, the most similar one first."""
+    for part in location[:-1]:
+        inner = model.model_fields[str(part)] if str(part) in model.model_fields else None
+        found = _model_in(inner.annotation) if inner is not None else None
+        # A key of a mapping (an arm's name, an index): its values share one model.
+        model = found or model
+    keys = list(model.model_fields)
+    near = get_close_matches(str(location[-1]), keys, n=1)
+    hint = f"did you mean {near[0]}? " if near else ""
+    return f"{hint}valid: {', '.join(keys)}"
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The model that an annotation like ``dict[str, Arm]`` or ``Arm | None`` speaks of."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for arg in get_args(annotation) if (found := _model_in(arg))), None)
