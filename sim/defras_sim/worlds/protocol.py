@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defras_sim.geometry import Floats, Pose
-from defras_sim.scene import ArmName
 from defras_sim.surface import Surface
 
 JAW_OPEN_RAD = 0.8
@@ -66,7 +65,7 @@ class Observation:
     """
 
     time_s: float
-    arms: Mapping[ArmName, ArmObservation]
+    arms: Mapping[str, ArmObservation]
     cloud: PointCloud | None = None
     depth_image: CameraImage | None = None
     endoscope_image: CameraImage | None = None
@@ -90,7 +89,7 @@ class ArmCommand:
 class Command:
     """One command per arm; an arm that is not named holds still with its grip as it is."""
 
-    arms: Mapping[ArmName, ArmCommand] = field(default_factory=dict)
+    arms: Mapping[str, ArmCommand] = field(default_factory=dict)
 
 
 HOLD = Command()

@@ -1,0 +1,131 @@
+"""What the nodes of one executive share. One instance per executive; nothing is global."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import isnan
+from typing import Any, Literal
+
+from defras_bt.monitoring.reading import MonitorReading
+from defras_bt.planning.plan import GridPoint, Plan
+from defras_bt.recording.record import Event, Level
+from defras_sim.geometry import Floats, Pose
+from defras_sim.tissue.state import TissueState
+from defras_sim.worlds.protocol import ArmCommand, Command, Observation
+
+Outcome = Literal["goal", "not_reached", "human", "error"]
+
+
+@dataclass(frozen=True)
+class TickInputs:
+    """Everything known when the tree is ticked; never changed by a node.
+
+    ``missing`` lists, in words, each reading that is absent, not a number or too old: nodes and
+    gate treat any entry as a tripped guard. ``force_n`` is the largest grasp force estimated by
+    the twin: 0 while nothing is held, NaN while the twin cannot say.
+    """
+
+    tick: int
+    time_s: float
+    observation: Observation
+    missing: tuple[str, ...]
+    twin: TissueState | None
+    force_n: float
+    force_threshold_n: float
+    reading: MonitorReading | None
+    operator_stop: str | None = None
+
+
+@dataclass
+class Grip:
+    """What one arm holds since when. ``starts_m`` remembers where each manoeuvre began."""
+
+    point: GridPoint
+    grasp_tip: Pose
+    starts_m: dict[str, Floats] = field(default_factory=dict)
+    done: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class LearningAttempt:
+    """When attachments were last learned: the warning state and the tips (3,) per arm then."""
+
+    warning_state: int
+    tips_m: Mapping[str, Floats]
+
+
+@dataclass
+class Blackboard:
+    """Inputs of the tick, decisions of the nodes, and what must outlive a tick.
+
+    ``metric`` names the discrepancy whose warning state counts; None for a tree without monitoring.
+    ``command`` and ``rate`` start every tick at hold and 1: a rate is always taken from its
+    nominal value, never from the tick before. ``force_over_s`` is how long the force has been over
+    its threshold or unknown without a break. ``unexplained``: learning last failed.
+    ``plan_exposing`` lists the manoeuvres after which the plan counts on seeing the region;
+    ``new_plan`` waits for the executive to put it into the tree after the tick.
+    """
+
+    inputs: TickInputs
+    metric: str | None = None
+    command: Command = field(default_factory=Command)
+    rate: float = 1.0
+    events: list[Event] = field(default_factory=list)
+
+    plan: Plan | None = None
+    new_plan: Plan | None = None
+    plan_exposing: tuple[str, ...] = ()
+    no_plan: str | None = None
+    preoperative_used: bool = False
+    blocked: set[GridPoint] = field(default_factory=set)
+    at: dict[str, GridPoint] = field(default_factory=dict)
+    grips: dict[str, Grip] = field(default_factory=dict)
+    actions_done: int = 0
+
+    rest_calibrated: bool = False
+    force_over_s: float = 0.0
+    last_learning: LearningAttempt | None = None
+    unexplained: bool = False
+    operator_refused: str | None = None
+    outcome: Outcome | None = None
+    outcome_reason: str = ""
+
+    def begin_tick(self, inputs: TickInputs) -> None:
+        """Forget the last tick's decisions; keep what lasts."""
+        self.inputs = inputs
+        self.command = Command()
+        self.rate = 1.0
+        self.events = []
+
+    def move(self, arm: str, command: ArmCommand) -> None:
+        """Propose motion for one arm; the gate has the last word."""
+        self.command = Command({**self.command.arms, arm: command})
+
+    def tell(
+        self, kind: str, sentence: str, level: Level = "info", data: Mapping[str, Any] | None = None
+    ) -> None:
+        """Log one sentence that a surgeon understands."""
+        self.events.append(Event(self.inputs.time_s, kind, level, sentence, dict(data or {})))
+
+    def end(self, outcome: Outcome, reason: str) -> None:
+        """Decide the run's outcome; the first decision stands."""
+        if self.outcome is None:
+            self.outcome = outcome
+            self.outcome_reason = reason
+
+    @property
+    def warning_state(self) -> int | None:
+        """State of the metric that this tree listens to; None if unknown or not monitored."""
+        reading = self.inputs.reading
+        if reading is None or self.metric is None or isnan(reading.mu_m[self.metric]):
+            return None
+        return reading.warning_state[self.metric]
+
+    @property
+    def mu_m(self) -> float:
+        """Discrepancy of the metric that this tree listens to; NaN if unknown or not monitored."""
+        reading = self.inputs.reading
+        if reading is None or self.metric is None:
+            return float("nan")
+        return reading.mu_m[self.metric]

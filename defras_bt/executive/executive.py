@@ -1,0 +1,159 @@
+"""The executive: it owns the clock and closes the loop from the world to the world."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import py_trees
+
+from defras_bt.acting.actions import action_leaves
+from defras_bt.executive.blackboard import Blackboard, TickInputs
+from defras_bt.executive.context import Context
+from defras_bt.executive.gate import CommandGate
+from defras_bt.executive.loader import LoadedTree, load_tree
+from defras_bt.executive.perception import Perception
+from defras_bt.executive.statuses import TickedVisitor
+from defras_bt.recording.record import Event, Recorder, TickRecord
+from defras_sim.worlds.protocol import HOLD, Command, World
+
+
+class ExecutiveFailed(RuntimeError):
+    """Something broke while operating; motion was stopped and the grip kept."""
+
+
+class Executive:
+    """Runs one tree in one world until the tree decides the outcome or time is over.
+
+    One tick: observe, sense, track the twin, monitor, tick the tree, check the command, send it,
+    record, put a new plan into the tree, let time pass.
+    """
+
+    def __init__(
+        self,
+        tree_file: Path,
+        context: Context,
+        world: World,
+        perception: Perception,
+        recorder: Recorder,
+        max_time_s: float,
+    ) -> None:
+        self._context = context
+        self._board: Blackboard = context.board
+        self._world = world
+        self._perception = perception
+        self._recorder = recorder
+        self._max_time_s = max_time_s
+        self.tree: LoadedTree = load_tree(tree_file, context)
+        self._board.metric = self.tree.metric
+        self._bt = py_trees.trees.BehaviourTree(self.tree.root)
+        self._ticked = TickedVisitor()
+        self._bt.add_visitor(self._ticked)
+        self._gate = CommandGate(context.scene, self.tree.metric)
+        self._tick = 0
+        self._state_before = 0
+        self._over_before = False
+        self._last: TickRecord | None = None
+
+    def run(self) -> None:
+        """Tick until there is an outcome; it stands on the blackboard then.
+
+        Raises:
+            ExecutiveFailed: after any exception. Motion is zero, the grip is kept, and what
+                happened stands in the last record.
+        """
+        try:
+            while self._board.outcome is None:
+                self._one_tick()
+        except Exception as error:
+            self._world.command(HOLD)
+            reason = f"{type(error).__name__}: {error}"
+            self._board.end("error", reason)
+            self._record_failure(f"Motion stopped, the grip is kept: {reason}")
+            raise ExecutiveFailed(reason) from error
+
+    def _one_tick(self) -> None:
+        board = self._board
+        inputs = self._perception.update(self._tick, self._world.observe())
+        board.begin_tick(inputs)
+        self._bt.tick()
+        self._tell_changes(inputs)
+        if inputs.time_s >= self._max_time_s and board.outcome is None:
+            board.tell("end", f"Stopped after {inputs.time_s:.0f} s without the goal.", "error")
+            board.end("not_reached", f"time is over after {inputs.time_s:.0f} s")
+        verdict = self._gate.check(board.command, board.rate, inputs)
+        sent = verdict.command if board.outcome is None else HOLD
+        self._world.command(sent)
+        self._record(inputs, sent)
+        self._splice()
+        self._tick += 1
+        self._world.step()
+
+    def _splice(self) -> None:
+        """Put a plan that a node brought into the tree; it is carried out from the next tick on."""
+        board, slot = self._board, self.tree.plan_slot
+        if board.new_plan is None:
+            return
+        if slot is None:
+            raise ValueError(f"tree {self.tree.name} makes plans but has no plan_slot")
+        slot.fill(action_leaves(board.new_plan, self._context))
+        board.plan, board.new_plan = board.new_plan, None
+
+    def _tell_changes(self, inputs: TickInputs) -> None:
+        """Say when the warning state or the force rose."""
+        board = self._board
+        state = board.warning_state or 0
+        if state > self._state_before:
+            what = ("slower, and learning", "stop, learn, plan anew", "stop, ask a human")[
+                state - 1
+            ]
+            board.tell(
+                "warning",
+                f"Warning state {state}: the tissue is {board.mu_m * 1e3:.1f} mm off the model; "
+                f"{what}.",
+                "warning",
+                {"state": state},
+            )
+        self._state_before = state
+        over = inputs.force_n > inputs.force_threshold_n
+        if over and not self._over_before:
+            board.tell(
+                "force",
+                f"The estimated force is {inputs.force_n:.2f} N, "
+                f"over {inputs.force_threshold_n:.2f} N: slower.",
+                "warning",
+            )
+        self._over_before = over
+
+    def _record(self, inputs: TickInputs, sent: Command) -> None:
+        board, slot = self._board, self.tree.plan_slot
+        snapshot = self._ticked.snapshot(self.tree)
+        step = slot.step if slot is not None else None
+        self._last = TickRecord(
+            tick=inputs.tick,
+            time_s=inputs.time_s,
+            observation=inputs.observation,
+            twin=inputs.twin,
+            reading=inputs.reading,
+            force_n=inputs.force_n,
+            true_force_n=self._world.true_force_n(),
+            true_surface=self._world.true_surface(),
+            rate=board.rate,
+            proposed=board.command,
+            sent=sent,
+            believed=self._context.scene.attached,
+            node_status=snapshot.status,
+            node_message=snapshot.message,
+            plan=board.plan,
+            plan_step=step if step is not None else 0,
+            events=tuple(board.events),
+        )
+        self._recorder.tick(self._last)
+
+    def _record_failure(self, sentence: str) -> None:
+        """One more record, so that nobody has to guess how the run ended."""
+        if self._last is None:
+            return
+        event = Event(self._last.time_s, "error", "error", sentence)
+        closing = replace(self._last, tick=self._last.tick + 1, sent=HOLD, events=(event,))
+        self._recorder.tick(closing)

@@ -1,0 +1,88 @@
+"""From a world's observation to what the tree is ticked with: sensing, twin, monitoring."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from defras_bt.executive.blackboard import Blackboard, TickInputs
+from defras_bt.executive.grips import GripTracker
+from defras_bt.learning.buffer import KeyframeBuffer
+from defras_bt.monitoring.reading import MonitorReading
+from defras_bt.monitoring.warning import WarningMonitor
+from defras_bt.sensing.freshness import stale
+from defras_bt.sensing.sense import SensedObservation, sense
+from defras_sim.tissue.state import TissueState
+from defras_sim.twin import Twin
+from defras_sim.worlds.protocol import Observation
+
+
+class Perception:
+    """Keeps twin, monitor and keyframes in step with the observations."""
+
+    def __init__(
+        self,
+        board: Blackboard,
+        twin: Twin,
+        monitor: WarningMonitor,
+        keyframes: KeyframeBuffer,
+        force_threshold_n: float,
+        operator_stop: Callable[[], str | None],
+    ) -> None:
+        self._board = board
+        self._twin = twin
+        self._monitor = monitor
+        self._keyframes = keyframes
+        self._force_threshold_n = force_threshold_n
+        self._operator_stop = operator_stop
+        self._grips = GripTracker(board, twin)
+
+    def update(self, tick: int, observation: Observation) -> TickInputs:
+        """Everything the tree may know at this tick."""
+        scene, board = self._twin.scene, self._board
+        sensed = sense(observation, scene)
+        missing = stale(sensed, scene)
+        if self._grips.update(sensed):
+            self._keyframes.clear()
+            self._monitor.twin_changed()
+        setpoints = {n: arm.setpoint_tissue_from_tip for n, arm in sensed.arms.items()}
+        state = self._twin.track(setpoints, sensed.time_s)
+        force_n = self._twin.force_n
+        self._count_force(force_n, scene.tick_s)
+        reading = self._monitored(sensed, state)
+        if board.grips and "cloud" not in missing and sensed.cloud is not None:
+            self._keyframes.add(
+                sensed.time_s,
+                {name: grip.grasp_tip for name, grip in board.grips.items()},
+                {name: setpoints[name] for name in board.grips},
+                sensed.cloud,
+            )
+        return TickInputs(
+            tick=tick,
+            time_s=sensed.time_s,
+            observation=sensed,
+            missing=_sentences(sensed, missing.values()),
+            twin=state,
+            force_n=force_n,
+            force_threshold_n=self._force_threshold_n,
+            reading=reading,
+            operator_stop=self._operator_stop(),
+        )
+
+    def _monitored(self, sensed: SensedObservation, state: TissueState) -> MonitorReading | None:
+        if not self._board.rest_calibrated and not self._board.grips:
+            self._monitor.observe_rest(sensed.cloud, state.surface)
+        if not self._monitor.calibration:
+            return None
+        return self._monitor.reading(sensed.cloud, state.surface, sensed.time_s)
+
+    def _count_force(self, force_n: float, tick_s: float) -> None:
+        over = np.isnan(force_n) or force_n > self._force_threshold_n
+        self._board.force_over_s = self._board.force_over_s + tick_s if over else 0.0
+
+
+def _sentences(sensed: SensedObservation, stale_readings: Iterable[str]) -> tuple[str, ...]:
+    """What is missing, in words; a fault explains only a reading that is missing because of it."""
+    late = tuple(stale_readings)
+    return (*late, *sensed.faults) if late else ()

@@ -1,0 +1,52 @@
+"""The leaf that learns attachments from what was seen since the grasp."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from py_trees.common import Status
+
+from defras_bt.executive.blackboard import LearningAttempt
+from defras_bt.executive.node import Node, Role
+from defras_bt.executive.registry import register_node
+
+
+@register_node
+class LearnAttachments(Node):
+    """Estimate the attachments; adopt them only if they explain what was not fitted."""
+
+    role: ClassVar[Role] = "recovery"
+
+    def update(self) -> Status:
+        board, context = self.context.board, self.context
+        frames = context.keyframes.frames()
+        if not frames:
+            return self.fail("no_data", "no shape was seen since the grasp")
+        arms = board.inputs.observation.arms
+        board.last_learning = LearningAttempt(
+            warning_state=board.warning_state or 0,
+            tips_m={name: arm.tissue_from_tip.position_m for name, arm in arms.items()},
+        )
+        estimate = context.estimator.estimate(context.scene, frames, context.rng)
+        before_mm, after_mm = estimate.held_out_before_m * 1e3, estimate.held_out_after_m * 1e3
+        data = {
+            "adopted": estimate.adopted,
+            "held_out_before_m": estimate.held_out_before_m,
+            "held_out_after_m": estimate.held_out_after_m,
+        }
+        if not estimate.adopted:
+            board.unexplained = True
+            board.tell("learning", f"Attachments kept: {estimate.reason}", "warning", data)
+            return self.fail("rejected", estimate.reason)
+        changed = int((estimate.attached != context.scene.attached).sum())
+        context.twin.set_attached(estimate.attached)
+        context.monitor.twin_changed()
+        board.unexplained = False
+        board.tell(
+            "learning",
+            f"Attachments learned: {changed} holes changed; the model now misses unseen points by "
+            f"{after_mm:.1f} mm instead of {before_mm:.1f} mm.",
+            "info",
+            data,
+        )
+        return self.succeed("adopted", estimate.reason)

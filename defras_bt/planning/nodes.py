@@ -1,0 +1,167 @@
+"""Leaves that bring a plan: the one made before the operation, or a new one from what is true."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from py_trees.common import Status
+from pydantic import Field
+
+from defras_bt.acting.jaw import JAW_TOLERANCE_RAD
+from defras_bt.executive.node import Node, NodeParameters, Role
+from defras_bt.executive.registry import register_node
+from defras_bt.planning.plan import ArmSituation, GridPoint, Plan, Situation
+from defras_bt.planning.planner import NoPlan
+from defras_sim.worlds.protocol import JAW_OPEN_RAD
+
+Manoeuvres = tuple[Literal["pull", "move", "fold"], ...]
+
+# A retraction starts with the pull; what follows is a matter of trying.
+SEQUENCES: tuple[Manoeuvres, ...] = (
+    ("pull",),
+    ("pull", "fold"),
+    ("pull", "move"),
+    ("pull", "move", "fold"),
+)
+
+
+class ReplanParameters(NodeParameters):
+    """``exposing``: the manoeuvres of a retraction; ``rehearse``: how many grasp points the twin
+    may try in simulation before one is chosen (0: the optimisation decides alone)."""
+
+    exposing: Annotated[Manoeuvres, Field(min_length=1)] = ("pull", "move", "fold")
+    rehearse: Annotated[int, Field(ge=0)] = 0
+
+
+class PlanSource(Node):
+    """Base of the leaves that bring plans."""
+
+    role: ClassVar[Role] = "recovery"
+
+    def adopt(self, plan: Plan, why: str) -> Status:
+        """Put ``plan`` in place for the coming ticks, if the operator approves it."""
+        board = self.context.board
+        if not self.context.approve(plan):
+            board.operator_refused = "the operator did not approve the plan"
+            return self.fail("not_approved", board.operator_refused)
+        board.new_plan = plan
+        board.tell("plan", why, data={"actions": [str(action) for action in plan.actions]})
+        return self.succeed("planned", why)
+
+
+@register_node
+class UsePreoperativePlan(PlanSource):
+    """Bring the plan made before the operation, once, at the start."""
+
+    def update(self) -> Status:
+        board, plan = self.context.board, self.context.preoperative
+        if plan is None:
+            return self.fail("none", "there is no plan from before the operation")
+        if board.preoperative_used:
+            return self.fail("used", "the plan from before the operation was used already")
+        board.preoperative_used = True
+        steps = len(plan.actions)
+        return self.adopt(plan, f"The plan made before the operation is used: {steps} actions.")
+
+
+@register_node
+class Replan(PlanSource):
+    """Plan anew from what is sensed now; grasp points that failed stay blocked."""
+
+    Parameters = ReplanParameters
+    parameters: ReplanParameters
+
+    def update(self) -> Status:
+        board = self.context.board
+        first = board.plan is None and not board.preoperative_used
+        self._block_exhausted()
+        try:
+            plan = self._rehearsed() if self.parameters.rehearse else self._plan(frozenset())
+        except NoPlan as error:
+            board.no_plan = str(error)
+            return self.fail("no_plan", str(error))
+        if not first:
+            board.tell(
+                "replan", f"Planned anew from what is true now: {len(plan.actions)} actions."
+            )
+        return self.adopt(plan, f"A plan of {len(plan.actions)} actions was found.")
+
+    def _block_exhausted(self) -> None:
+        """A retraction that ended without showing the region will not show it later."""
+        board = self.context.board
+        for arm, grip in board.grips.items():
+            if board.plan_exposing and set(board.plan_exposing) <= set(grip.done):
+                board.blocked.add(grip.point)
+                board.tell(
+                    "hold",
+                    f"{arm.upper()} finished its retraction at {grip.point} and too little is "
+                    "visible: this grasp point will not be used again.",
+                )
+
+    def _situation(self, skipped: frozenset[GridPoint], exposing: Manoeuvres) -> Situation:
+        board = self.context.board
+        arms = {}
+        for name, arm in board.inputs.observation.arms.items():
+            grip = board.grips.get(name)
+            arms[name] = ArmSituation(
+                at=board.at.get(name),
+                holding=grip.point if grip else None,
+                jaw_open=arm.jaw_rad >= JAW_OPEN_RAD - JAW_TOLERANCE_RAD,
+                done=grip.done if grip else (),
+            )
+        return Situation(arms, frozenset(board.blocked) | skipped, exposing)
+
+    def _plan(self, skipped: frozenset[GridPoint], exposing: Manoeuvres | None = None) -> Plan:
+        situation = self._situation(skipped, exposing or self.parameters.exposing)
+        plan = self.context.planner.plan(situation, self.context.scene.attached)
+        self.context.board.plan_exposing = situation.exposing
+        return plan
+
+    def _rehearsed(self) -> Plan:
+        """The first plan in the planner's order of preference that exposes in simulation.
+
+        If none does, the one that came closest: the model may be wrong, and looking tells.
+        """
+        skipped: frozenset[GridPoint] = frozenset()
+        best: tuple[float, frozenset[GridPoint], Manoeuvres] | None = None
+        for _ in range(self.parameters.rehearse):
+            try:
+                plan = self._plan(skipped)
+            except NoPlan:
+                break
+            point = _grasp_point(plan)
+            seen, exposing = self._outlook(point)
+            if best is None or seen > best[0]:
+                best = (seen, skipped, exposing)
+            if seen >= self.context.scene.thresholds.roi_visibility:
+                break
+            skipped |= {point}
+        if best is None:
+            return self._plan(frozenset())
+        return self._plan(best[1], best[2])
+
+    def _outlook(self, point: GridPoint) -> tuple[float, Manoeuvres]:
+        """Best simulated visibility of a retraction at ``point`` within the force threshold, and
+        the shortest manoeuvres that reach it (or the goal)."""
+        done = next((g.done for g in self.context.board.grips.values() if g.point == point), ())
+        limit_n = self.context.board.inputs.force_threshold_n
+        wanted = self.context.scene.thresholds.roi_visibility
+        best: tuple[float, Manoeuvres] = (-1.0, self.parameters.exposing)
+        for sequence in SEQUENCES:
+            if sequence[: len(done)] != done:
+                continue
+            rehearsal = self.context.rehearse(self.context.scene, point, sequence)
+            seen = rehearsal.visibility[-1] if rehearsal.force_max_n <= limit_n else 0.0
+            if seen > best[0]:
+                best = (seen, sequence)
+            if seen >= wanted:
+                break
+        return best
+
+
+def _grasp_point(plan: Plan) -> GridPoint:
+    """The point at which ``plan`` holds the tissue in the end."""
+    point = plan.actions[-1].point
+    if point is None:
+        raise ValueError(f"plan ends with {plan.actions[-1]}, which concerns no grasp point")
+    return point
