@@ -130,6 +130,8 @@ def _unfit(node_class: type[Node]) -> str | None:
         return "should have a CamelCase name: snake_case ones are kept for composites"
     if getattr(node_class, "role", None) not in get_args(Role):
         return f"needs a role: one of {', '.join(get_args(Role))}"
+    if inspect.isabstract(node_class):
+        return "has no update(): nothing would happen when it is ticked"
     if not inspect.getdoc(node_class) or inspect.getdoc(node_class) == inspect.getdoc(Node):
         return "needs a docstring: editors show it to whoever writes a tree"
     parameters = node_class.Parameters
