@@ -1,0 +1,258 @@
+"""Elastic energy, its gradient and its tangent, summed over all quadrature points of a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import sparse
+
+from defras_sim.geometry import Floats
+from defras_sim.scene import MaterialName
+from defras_sim.tissue import materials
+from defras_sim.tissue.elements import (
+    Quadrature,
+    quadrature,
+    shape_gradients,
+    shape_values,
+)
+from defras_sim.tissue.mesh import Integers, Mesh
+
+
+@dataclass(frozen=True)
+class PrincipalStress:
+    """Largest principal Cauchy stress over all quadrature points, and where it acts now."""
+
+    largest_pa: float
+    position_m: Floats
+
+
+class ElasticBody:
+    """A mesh of one hyperelastic material. Positions are (nodes, 3); nothing is kept between calls.
+
+    ``mu_pa`` and ``lam_pa`` (elements,) are the material's own parameters, see
+    :func:`defras_sim.tissue.materials.lame_parameters`.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        material: MaterialName,
+        mu_pa: float | Floats,
+        lam_pa: float | Floats,
+        rule: Quadrature | None = None,
+    ) -> None:
+        self.mesh = mesh
+        count = len(mesh.connectivity)
+        self.mu_pa = np.broadcast_to(np.asarray(mu_pa, dtype=float), count).copy()
+        self.lam_pa = np.broadcast_to(np.asarray(lam_pa, dtype=float), count).copy()
+        self._code = materials.CODES[material]
+        rule = rule or quadrature(mesh.element)
+        self._values = shape_values(mesh.element, rule.points)
+        self._gradients, self._volumes = _rest_gradients(mesh, rule)
+        self.pattern, self._places = _pattern(mesh.connectivity, len(mesh.nodes_m))
+
+    def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
+        """Elastic energy [J], infinite where the material cannot be; gradient (nodes, 3) [N]."""
+        gradient = np.zeros_like(positions_m)
+        energy = _energy_and_gradient(
+            self._code,
+            positions_m,
+            self.mesh.connectivity,
+            self._gradients,
+            self._volumes,
+            self.mu_pa,
+            self.lam_pa,
+            gradient,
+        )
+        return energy, gradient
+
+    def tangent_entries(self, positions_m: Floats) -> Floats:
+        """Entries of the second derivative, in the order of :attr:`pattern` (CSC, symmetric)."""
+        entries = np.zeros(self.pattern.nnz)
+        _tangent(
+            self._code,
+            positions_m,
+            self.mesh.connectivity,
+            self._gradients,
+            self._volumes,
+            self.mu_pa,
+            self.lam_pa,
+            self._places,
+            entries,
+        )
+        return entries
+
+    def entries_of(self, matrix: sparse.csc_array) -> Floats:
+        """The entries of ``matrix``, which lies within :attr:`pattern`, in its order."""
+        size = self.pattern.shape[0]
+        columns = np.repeat(np.arange(size), np.diff(self.pattern.indptr))
+        keys = columns * size + self.pattern.indices
+        found = matrix.tocoo()
+        places = np.searchsorted(keys, found.col.astype(np.int64) * size + found.row)
+        return np.bincount(places, weights=found.data, minlength=len(keys)).astype(np.float64)
+
+    def largest_principal_stress(self, positions_m: Floats) -> PrincipalStress:
+        largest, element, point = _largest_principal_stress(
+            self._code,
+            positions_m,
+            self.mesh.connectivity,
+            self._gradients,
+            self.mu_pa,
+            self.lam_pa,
+        )
+        place = self._values[point] @ positions_m[self.mesh.connectivity[element]]
+        return PrincipalStress(largest, place)
+
+
+def _rest_gradients(mesh: Mesh, rule: Quadrature) -> tuple[Floats, Floats]:
+    """Rest gradients (elements, points, 3, nodes) and volumes (elements, points)."""
+    local = shape_gradients(mesh.element, rule.points)
+    corners = mesh.nodes_m[mesh.connectivity]
+    jacobian = np.einsum("eai,qaj->eqij", corners, local)
+    determinant = np.linalg.det(jacobian)
+    if np.any(determinant <= 0):
+        bad = int(np.argmin(determinant.min(axis=1)))
+        raise ValueError(f"element {bad} of the mesh is inverted; its volume must be positive")
+    gradients = np.einsum("qaj,eqji->eqia", local, np.linalg.inv(jacobian))
+    return np.ascontiguousarray(gradients), determinant * rule.weights
+
+
+def _pattern(connectivity: Integers, nodes: int) -> tuple[sparse.csc_array, NDArray[np.int32]]:
+    """Sparsity of the tangent, and where the 3x3 block of each pair of nodes starts in it.
+
+    ``places`` (elements, a, b, 3): entry of row 3 a in column 3 b + k, before the next two rows.
+    """
+    count, width = connectivity.shape
+    rows = np.repeat(connectivity, width, axis=1).ravel()
+    columns = np.tile(connectivity, (1, width)).ravel()
+    graph = sparse.csc_array((np.ones(len(rows)), (rows, columns)), shape=(nodes, nodes))
+    graph.sum_duplicates()
+    graph.sort_indices()
+    pattern = sparse.csc_array(sparse.kron(graph, np.ones((3, 3)), format="csc"))
+    pattern.sort_indices()
+    pattern.data[:] = 0.0
+    keys = np.repeat(np.arange(nodes), np.diff(graph.indptr)) * nodes + graph.indices
+    block = np.searchsorted(keys, columns * nodes + rows)
+    within = block - graph.indptr[columns]
+    per_column = np.diff(graph.indptr)[columns] * 3
+    start = graph.indptr[columns] * 9 + within * 3
+    places = start[:, None] + per_column[:, None] * np.arange(3)
+    return pattern, places.reshape(count, width, width, 3).astype(np.int32)
+
+
+_jit = njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
+
+
+@_jit
+def _deformation(gradient: Floats, local: Floats, F: Floats) -> None:
+    """F[i, J] = sum over nodes of local[i, a] gradient[J, a]."""
+    for i in range(3):
+        for j in range(3):
+            total = 0.0
+            for a in range(local.shape[1]):
+                total += local[i, a] * gradient[j, a]
+            F[i, j] = total
+
+
+@_jit
+def _energy_and_gradient(  # type: ignore[no-untyped-def]
+    code, positions, connectivity, gradients, volumes, mu, lam, out
+):
+    elements, points, _, width = gradients.shape
+    local = np.empty((3, width))
+    force = np.empty((3, width))
+    F = np.empty((3, 3))
+    P = np.empty((3, 3))
+    energy = 0.0
+    for e in range(elements):
+        for a in range(width):
+            for i in range(3):
+                local[i, a] = positions[connectivity[e, a], i]
+                force[i, a] = 0.0
+        for q in range(points):
+            slopes = gradients[e, q]
+            volume = volumes[e, q]
+            _deformation(slopes, local, F)
+            energy += volume * materials.stress(code, F, mu[e], lam[e], P)
+            for i in range(3):
+                x, y, z = volume * P[i, 0], volume * P[i, 1], volume * P[i, 2]
+                for a in range(width):
+                    force[i, a] += x * slopes[0, a] + y * slopes[1, a] + z * slopes[2, a]
+        for a in range(width):
+            for i in range(3):
+                out[connectivity[e, a], i] += force[i, a]
+    return energy
+
+
+@_jit
+def _tangent(  # type: ignore[no-untyped-def]
+    code, positions, connectivity, gradients, volumes, mu, lam, places, out
+):
+    elements, points, _, width = gradients.shape
+    local = np.empty((3, width))
+    block = np.empty((3, 3, width, width))
+    F = np.empty((3, 3))
+    A = np.empty((9, 9))
+    for e in range(elements):
+        for a in range(width):
+            for i in range(3):
+                local[i, a] = positions[connectivity[e, a], i]
+        block[:] = 0.0
+        for q in range(points):
+            slopes = gradients[e, q]
+            _deformation(slopes, local, F)
+            materials.tangent(code, F, mu[e], lam[e], A)
+            volume = volumes[e, q]
+            for i in range(3):
+                for k in range(i, 3):
+                    target = block[i, k]
+                    for a in range(width):
+                        x = y = z = 0.0
+                        for j in range(3):
+                            g = volume * slopes[j, a]
+                            x += g * A[3 * i + j, 3 * k]
+                            y += g * A[3 * i + j, 3 * k + 1]
+                            z += g * A[3 * i + j, 3 * k + 2]
+                        for b in range(width):
+                            target[a, b] += x * slopes[0, b] + y * slopes[1, b] + z * slopes[2, b]
+        for b in range(width):
+            for a in range(width):
+                for k in range(3):
+                    place = places[e, a, b, k]
+                    for i in range(3):
+                        if i <= k:
+                            out[place + i] += block[i, k, a, b]
+                        else:
+                            out[place + i] += block[k, i, b, a]
+
+
+@_jit
+def _largest_principal_stress(  # type: ignore[no-untyped-def]
+    code, positions, connectivity, gradients, mu, lam
+):
+    elements, points, _, width = gradients.shape
+    local = np.empty((3, width))
+    F = np.empty((3, 3))
+    P = np.empty((3, 3))
+    sigma = np.empty((3, 3))
+    V = np.empty((3, 3))
+    largest, at_element, at_point = -np.inf, 0, 0
+    for e in range(elements):
+        for a in range(width):
+            for i in range(3):
+                local[i, a] = positions[connectivity[e, a], i]
+        for q in range(points):
+            _deformation(gradients[e, q], local, F)
+            J = materials.cofactor(F, sigma)
+            materials.stress(code, F, mu[e], lam[e], P)
+            for i in range(3):
+                for j in range(3):
+                    sigma[i, j] = (P[i, 0] * F[j, 0] + P[i, 1] * F[j, 1] + P[i, 2] * F[j, 2]) / J
+            materials.jacobi_eigen(sigma, V)
+            value = max(sigma[0, 0], sigma[1, 1], sigma[2, 2])
+            if value > largest:
+                largest, at_element, at_point = value, e, q
+    return largest, at_element, at_point
