@@ -265,6 +265,12 @@ def _faults(scene: Scene) -> list[tuple[tuple[Any, ...], str]]:
     tissue, roi, grid = scene.tissue, scene.roi, scene.grasp
     nx, ny = scene.hole_counts
     rows = scene.attachments.map
+    if nx < 1 or ny < 1:
+        message = (
+            f"attachments.hole_pitch_m: {scene.attachments.hole_pitch_m} leaves no hole under the "
+            f"tissue; at most {min(tissue.length_x_m, tissue.width_y_m)}"
+        )
+        return [(("attachments", "hole_pitch_m"), message)]
     if len(rows) != ny:
         found.append((("attachments", "map"), f"attachments.map: {len(rows)} rows, needs {ny}"))
     for i, row in enumerate(rows):
@@ -291,8 +297,19 @@ def _faults(scene: Scene) -> list[tuple[tuple[Any, ...], str]]:
     delta = scene.thresholds.delta_m
     if not delta[0] < delta[1] < delta[2]:
         found.append((("thresholds", "delta_m"), "thresholds.delta_m: should increase"))
-    if any(count < 1 for count in (*tissue.elements_xyz, *scene.simulation.elements_xyz)):
-        found.append((("tissue", "elements_xyz"), "elements_xyz: each count should be 1 or more"))
+    for place, counts in (
+        (("tissue", "elements_xyz"), tissue.elements_xyz),
+        (("simulation", "elements_xyz"), scene.simulation.elements_xyz),
+        (("simulation", "bullet_elements_xyz"), scene.simulation.bullet_elements_xyz),
+    ):
+        if min(counts) < 1:
+            found.append((place, f"{'.'.join(place)}: each count should be 1 or more"))
+    if not scene.arms:
+        found.append((("arms",), "arms: needs at least one arm; valid: psm1, psm2"))
+    for name, camera in (("endoscope", scene.endoscope), ("depth_camera", scene.depth_camera)):
+        if np.hypot(*np.subtract(camera.target_m, camera.position_m)[:2]) < 1e-6:
+            message = f"{name}: looks straight up or down; move position_m or target_m sideways"
+            found.append(((name, "position_m"), message))
     for i, adopted in enumerate(scene.model.effects):
         message = f"model.effects.{i}: effect {adopted.effect!r} is unknown; available: none yet"
         found.append((("model", "effects", i), message))

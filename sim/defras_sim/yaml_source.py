@@ -159,7 +159,7 @@ def _worded(model: type[BaseModel], item: ErrorDetails) -> str:
 def _valid_keys(model: type[BaseModel], location: Sequence[str | int]) -> str:
     """The keys that may stand where ``location`` ends, the most similar one first."""
     for part in location[:-1]:
-        inner = model.model_fields[str(part)] if str(part) in model.model_fields else None
+        inner = model.model_fields.get(str(part))
         found = _model_in(inner.annotation) if inner is not None else None
         # A key of a mapping (an arm's name, an index): its values share one model.
         model = found or model

@@ -10,8 +10,8 @@ from defras_sim.geometry import Floats
 from defras_sim.scene import Camera
 from defras_sim.surface import Surface
 
-# Rays over the box around the tissue; about two thirds of them hit it.
-CLOUD_RAYS = 1800
+# Rays over the box around the tissue; most of them hit it.
+CLOUD_RAYS = 1450
 
 
 def depth_cloud_m(
