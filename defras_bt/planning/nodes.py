@@ -12,24 +12,17 @@ from defras_bt.executive.node import Node, NodeParameters, Role
 from defras_bt.executive.registry import register_node
 from defras_bt.planning.plan import ArmSituation, GridPoint, Plan, Situation
 from defras_bt.planning.planner import NoPlan
+from defras_sim.retraction import SEQUENCES
 from defras_sim.worlds.protocol import JAW_OPEN_RAD
 
-Manoeuvres = tuple[Literal["pull", "move", "fold"], ...]
-
-# A retraction starts with the pull; what follows is a matter of trying.
-SEQUENCES: tuple[Manoeuvres, ...] = (
-    ("pull",),
-    ("pull", "fold"),
-    ("pull", "move"),
-    ("pull", "move", "fold"),
-)
+Manoeuvre = Literal["pull", "move", "fold"]
 
 
 class ReplanParameters(NodeParameters):
     """``exposing``: the manoeuvres of a retraction; ``rehearse``: how many grasp points the twin
     may try in simulation before one is chosen (0: the optimisation decides alone)."""
 
-    exposing: Annotated[Manoeuvres, Field(min_length=1)] = ("pull", "move", "fold")
+    exposing: Annotated[tuple[Manoeuvre, ...], Field(min_length=1)] = ("pull", "move", "fold")
     rehearse: Annotated[int, Field(ge=0)] = 0
 
 
@@ -98,7 +91,7 @@ class Replan(PlanSource):
                     "visible: this grasp point will not be used again.",
                 )
 
-    def _situation(self, skipped: frozenset[GridPoint], exposing: Manoeuvres) -> Situation:
+    def _situation(self, skipped: frozenset[GridPoint], exposing: tuple[str, ...]) -> Situation:
         board = self.context.board
         arms = {}
         for name, arm in board.inputs.observation.arms.items():
@@ -111,7 +104,7 @@ class Replan(PlanSource):
             )
         return Situation(arms, frozenset(board.blocked) | skipped, exposing)
 
-    def _plan(self, skipped: frozenset[GridPoint], exposing: Manoeuvres | None = None) -> Plan:
+    def _plan(self, skipped: frozenset[GridPoint], exposing: tuple[str, ...] | None = None) -> Plan:
         situation = self._situation(skipped, exposing or self.parameters.exposing)
         plan = self.context.planner.plan(situation, self.context.scene.attached)
         self.context.board.plan_exposing = situation.exposing
@@ -123,7 +116,7 @@ class Replan(PlanSource):
         If none does, the one that came closest: the model may be wrong, and looking tells.
         """
         skipped: frozenset[GridPoint] = frozenset()
-        best: tuple[float, frozenset[GridPoint], Manoeuvres] | None = None
+        best: tuple[float, frozenset[GridPoint], tuple[str, ...]] | None = None
         for _ in range(self.parameters.rehearse):
             try:
                 plan = self._plan(skipped)
@@ -140,18 +133,18 @@ class Replan(PlanSource):
             return self._plan(frozenset())
         return self._plan(best[1], best[2])
 
-    def _outlook(self, point: GridPoint) -> tuple[float, Manoeuvres]:
+    def _outlook(self, point: GridPoint) -> tuple[float, tuple[str, ...]]:
         """Best simulated visibility of a retraction at ``point`` within the force threshold, and
         the shortest manoeuvres that reach it (or the goal)."""
         done = next((g.done for g in self.context.board.grips.values() if g.point == point), ())
         limit_n = self.context.board.inputs.force_threshold_n
         wanted = self.context.scene.thresholds.roi_visibility
-        best: tuple[float, Manoeuvres] = (-1.0, self.parameters.exposing)
+        best: tuple[float, tuple[str, ...]] = (-1.0, self.parameters.exposing)
         for sequence in SEQUENCES:
             if sequence[: len(done)] != done:
                 continue
             rehearsal = self.context.rehearse(self.context.scene, point, sequence)
-            seen = rehearsal.visibility[-1] if rehearsal.force_max_n <= limit_n else 0.0
+            seen = rehearsal.best_visibility if rehearsal.force_max_n <= limit_n else 0.0
             if seen > best[0]:
                 best = (seen, sequence)
             if seen >= wanted:

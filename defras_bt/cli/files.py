@@ -1,0 +1,37 @@
+"""Finding the files that a command names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from defras_bt.cli.errors import UserError
+from defras_sim.resources import resource
+from defras_sim.scene import Scene, load_scene
+
+
+def find(named: str, folder: str, suffix: str = ".yaml") -> Path:
+    """A file as given, or the shipped one of that name in ``folder``: "demo" is enough.
+
+    Raises:
+        UserError: there is neither.
+    """
+    given = Path(named)
+    if given.is_file():
+        return given
+    shipped = resource(folder)
+    inside = shipped / (named if named.endswith(suffix) else f"{named}{suffix}")
+    if given.name == named and inside.is_file():
+        return inside
+    names = ", ".join(sorted(p.stem for p in shipped.glob(f"*{suffix}")))
+    raise UserError(f"there is no file {named}; shipped with defras are: {names}")
+
+
+def find_scene(named: str) -> tuple[Path, Scene]:
+    """The scene file called ``named`` and what it says.
+
+    Raises:
+        UserError: there is no such file.
+        InvalidFile: it is not a scene.
+    """
+    file = find(named, "sim/scenes")
+    return file, load_scene(file)

@@ -1,0 +1,126 @@
+"""``defras run``: operate."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from defras_bt.cli.errors import OUTCOME_CODES, UserError
+from defras_bt.cli.files import find, find_scene
+from defras_bt.cli.preparation import prepared
+from defras_bt.executive.operation import WORLDS, Operation, operate
+from defras_bt.executive.tree_file import read_tree
+from defras_bt.planning.english import plan_sentences
+from defras_bt.planning.plan import Plan
+from defras_bt.recording.bag import BagRecorder
+from defras_bt.recording.progress import EventPrinter, ProgressLine
+from defras_bt.recording.record import Recorder
+from defras_bt.recording.report import ReportRecorder
+from defras_bt.recording.summary import SummaryRecorder
+from defras_bt.recording.timeline import TimelineRecorder
+
+EXAMPLE = "Example: defras run demo --actual demo_actual --world bullet --out out/demo"
+
+
+def run(
+    scene: Annotated[str, typer.Argument(help="Scene as believed: a file, or a shipped name.")],
+    actual: Annotated[
+        str | None, typer.Option(help="Scene as it really is; default: as believed.")
+    ] = None,
+    world: Annotated[str, typer.Option(help="model (fast) or bullet (PyBullet).")] = "model",
+    tree: Annotated[str, typer.Option(help="Tree: a file, or a shipped name.")] = "defras",
+    out: Annotated[Path | None, typer.Option(help="Folder for what the run leaves.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same run (model world).")] = 0,
+    max_time: Annotated[float, typer.Option(min=1, help="Longest world time in s.")] = 300.0,
+    approve: Annotated[bool, typer.Option("--approve", help="Ask before each plan.")] = False,
+) -> None:
+    """Retract the tissue until the region of interest is visible.
+
+    Leaves run.rrd, recording.mcap, run.json and report.html in --out. Exit code: 0 goal reached,
+    2 invalid input, 3 goal not reached, 4 a human was asked, 1 internal error.
+
+    Example: defras run demo --actual demo_actual --world bullet --out out/demo
+    """
+    if world not in WORLDS:
+        raise UserError(f"--world {world}: valid are {', '.join(WORLDS)}")
+    scene_file, believed = find_scene(scene)
+    actual_file, truth = find_scene(actual) if actual is not None else (None, believed)
+    if actual is not None and truth.hole_counts != believed.hole_counts:
+        raise UserError(f"{scene} and {actual} have different holes: they are not one patient")
+    tree_file = find(tree, "trees")
+    needs_plan = any(
+        spec.kind == "UsePreoperativePlan" for _, spec in read_tree(tree_file).root.walk()
+    )
+    console = Console(soft_wrap=True, highlight=False)
+    preparation = prepared(believed, world, needs_plan, console)
+    if preparation.plan is not None:
+        for sentence in plan_sentences(preparation.plan):
+            console.print(f"  {sentence}", markup=False)
+    operation = Operation(
+        scene=believed,
+        actual=truth,
+        scene_file=str(scene_file),
+        actual_file=str(actual_file) if actual_file else None,
+        world=world,
+        tree_file=tree_file,
+        seed=seed,
+        force_threshold_n=preparation.force_threshold_n,
+        preoperative=preparation.plan,
+        max_time_s=max_time,
+    )
+    recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console)]
+    if out is not None:
+        recorders += file_recorders(out)
+    asked: Callable[[Plan], bool] = _ask if approve else lambda plan: True
+    with stop_on_interrupt() as operator_stop:
+        summary = operate(operation, recorders, approve=asked, operator_stop=operator_stop)
+    if out is not None:
+        console.print(f"Written to {out}: run.rrd, recording.mcap, run.json, report.html")
+    raise typer.Exit(OUTCOME_CODES[str(summary.values["outcome"])])
+
+
+def file_recorders(out: Path) -> list[Recorder]:
+    """The recorders that write what a run leaves, in ``out``.
+
+    Raises:
+        UserError: the folder cannot be made.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"--out {out}: {error}") from error
+    return [
+        TimelineRecorder(out / "run.rrd"),
+        BagRecorder(out / "recording.mcap"),
+        SummaryRecorder(out / "run.json"),
+        ReportRecorder(out / "report.html"),
+    ]
+
+
+@contextmanager
+def stop_on_interrupt() -> Iterator[Callable[[], str | None]]:
+    """Ctrl-C asks the executive to stop and hold; a second one ends the program."""
+    asked: list[str] = []
+
+    def on_interrupt(*_: object) -> None:
+        if asked:
+            raise KeyboardInterrupt
+        asked.append("the operator asked to stop")
+
+    before = signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        yield lambda: asked[0] if asked else None
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _ask(plan: Plan) -> bool:
+    for sentence in plan_sentences(plan):
+        typer.echo(f"  {sentence}")
+    return typer.confirm("Carry out this plan?", default=False)

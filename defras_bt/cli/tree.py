@@ -1,0 +1,29 @@
+"""``defras tree``: look at trees and check them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from defras_bt.cli.files import find
+from defras_bt.executive.tree_file import read_tree
+from defras_bt.executive.tree_show import show_tree
+
+app = typer.Typer(help="Look at behaviour trees and check them.", no_args_is_help=True)
+Tree = Annotated[str, typer.Argument(help="Tree: a file, or a shipped name.")]
+
+
+@app.command("show")
+def show(tree: Tree = "defras") -> None:
+    """Draw a tree in the terminal. Example: defras tree show defras"""
+    typer.echo(show_tree(read_tree(find(tree, "trees"))))
+
+
+@app.command("check")
+def check(tree: Tree) -> None:
+    """Check a tree file: every fault with its place. Example: defras tree check mine.yaml"""
+    file = find(tree, "trees")
+    spec = read_tree(file)
+    count = sum(1 for _ in spec.root.walk())
+    typer.echo(f"{file}: {spec.name} is valid, {count} nodes; every motion stands under a guard")

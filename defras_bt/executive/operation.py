@@ -1,0 +1,159 @@
+"""One operation from files to outcome: everything is put together here, and nowhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from defras_bt.executive.blackboard import Blackboard, TickInputs
+from defras_bt.executive.context import Context
+from defras_bt.executive.executive import Executive, ExecutiveFailed
+from defras_bt.executive.perception import Perception
+from defras_bt.learning.buffer import KeyframeBuffer
+from defras_bt.learning.inverse import InverseEstimator
+from defras_bt.monitoring.warning import WarningMonitor
+from defras_bt.planning.plan import Plan
+from defras_bt.planning.planner import Planner
+from defras_bt.recording.composite import CompositeRecorder
+from defras_bt.recording.record import Recorder, RunInfo, RunSummary
+from defras_bt.recording.summary import SummaryRecorder
+from defras_bt.recording.versions import versions
+from defras_sim.retraction import GraspPoint, Rehearsal, Rehearser
+from defras_sim.scene import Scene
+from defras_sim.twin import Twin
+from defras_sim.worlds.bullet_world import BulletWorld
+from defras_sim.worlds.model_world import ModelWorld
+from defras_sim.worlds.protocol import World
+
+WORLDS = ("model", "bullet")
+
+
+@dataclass(frozen=True)
+class Operation:
+    """What to run. ``scene`` is believed, ``actual`` is there; the files are for the record."""
+
+    scene: Scene
+    actual: Scene
+    scene_file: str
+    actual_file: str | None
+    world: str
+    tree_file: Path
+    seed: int
+    force_threshold_n: float
+    preoperative: Plan | None = None
+    max_time_s: float = 300.0
+
+
+class TwinRehearsal:
+    """Rehearses on the twin's tissue as believed now; stops where the region is exposed."""
+
+    def __init__(self) -> None:
+        self._scene: Scene | None = None
+        self._rehearser: Rehearser | None = None
+
+    def __call__(self, scene: Scene, point: GraspPoint, manoeuvres: Sequence[str]) -> Rehearsal:
+        if self._rehearser is None or scene is not self._scene:
+            self._rehearser = Rehearser(scene, step_m=0.004, stop_when_exposed=True)
+            self._scene = scene
+        return self._rehearser.run(point, manoeuvres)
+
+
+def operate(
+    operation: Operation,
+    recorders: Sequence[Recorder] = (),
+    *,
+    approve: Callable[[Plan], bool] = lambda plan: True,
+    operator_stop: Callable[[], str | None] = lambda: None,
+) -> RunSummary:
+    """Run the operation to its outcome; every recorder is finished whatever happens.
+
+    Raises:
+        ExecutiveFailed: something broke; the recorders were finished first.
+        RecordingFailed: the run ended, but a recorder could not keep up.
+    """
+    started = perf_counter()
+    world_rng, learning_rng = np.random.default_rng(operation.seed).spawn(2)
+    believed = operation.scene.for_bullet() if operation.world == "bullet" else operation.scene
+    world = make_world(operation.world, operation.actual, world_rng)
+    try:
+        summary_recorder = SummaryRecorder()
+        recorder = CompositeRecorder([summary_recorder, *recorders])
+        twin = Twin(believed)
+        monitor = WarningMonitor(believed)
+        keyframes = KeyframeBuffer()
+        board = Blackboard(_before_first_tick(world, operation.force_threshold_n))
+        context = Context(
+            board=board,
+            twin=twin,
+            monitor=monitor,
+            planner=Planner(believed),
+            estimator=InverseEstimator(),
+            keyframes=keyframes,
+            rehearse=TwinRehearsal(),
+            rng=learning_rng,
+            preoperative=operation.preoperative,
+            approve=approve,
+        )
+        perception = Perception(
+            board, twin, monitor, keyframes, operation.force_threshold_n, operator_stop
+        )
+        executive = Executive(
+            operation.tree_file, context, world, perception, recorder, operation.max_time_s
+        )
+        recorder.start(_info(operation, executive, believed))
+        try:
+            executive.run()
+        finally:
+            summary = summary_recorder.summary(board.outcome or "error", perf_counter() - started)
+            recorder.finish(summary)
+    finally:
+        world.close()
+    return summary
+
+
+def make_world(name: str, actual: Scene, rng: np.random.Generator) -> World:
+    """The world called ``name`` with the patient as it really is.
+
+    Raises:
+        ValueError: there is no such world.
+    """
+    if name == "model":
+        return ModelWorld(actual, rng)
+    if name == "bullet":
+        return BulletWorld(actual, rng)
+    raise ValueError(f"there is no world {name!r}; there are: {', '.join(WORLDS)}")
+
+
+def _before_first_tick(world: World, force_threshold_n: float) -> TickInputs:
+    observation = world.observe()
+    return TickInputs(
+        tick=-1,
+        time_s=observation.time_s,
+        observation=observation,
+        missing=("nothing was sensed yet",),
+        twin=None,
+        force_n=float("nan"),
+        force_threshold_n=force_threshold_n,
+        reading=None,
+    )
+
+
+def _info(operation: Operation, executive: Executive, believed: Scene) -> RunInfo:
+    return RunInfo(
+        scene=believed,
+        scene_file=operation.scene_file,
+        actual=operation.actual,
+        actual_file=operation.actual_file,
+        world=operation.world,
+        tree=executive.tree.name,
+        seed=operation.seed,
+        metric=executive.tree.metric or "local",
+        force_threshold_n=operation.force_threshold_n,
+        tree_paths=executive.tree.kinds(),
+        versions=versions(),
+        believed=believed.attached,
+    )
