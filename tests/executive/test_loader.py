@@ -85,3 +85,9 @@ def test_an_invalid_file_makes_nothing(write_tree, toy_context, toys):
 def test_the_trees_that_come_with_this_project_are_valid(file: str):
     path: Path = resource("trees") / file
     assert read_tree(path, NODES).name == path.stem
+
+
+@pytest.mark.parametrize(("line", "metric"), [("", None), ("metric: median", "median")])
+def test_the_metric_that_counts_is_that_of_the_file(write_tree, toy_context, toys, line, metric):
+    file = write_tree(f"name: toy\n{line}\ntree: Think\n")
+    assert load_tree(file, toy_context, toys.registry).metric == metric
