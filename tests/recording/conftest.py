@@ -16,4 +16,4 @@ def short_run() -> SyntheticRun:
 @pytest.fixture(scope="session")
 def rich_run() -> SyntheticRun:
     """With everything a world can give."""
-    return SyntheticRun(grid=13)
+    return SyntheticRun(grid=9)

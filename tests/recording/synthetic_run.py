@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,7 +128,10 @@ class SyntheticRun:
             believed=scene.attached,
         )
 
-    def ticks(self) -> Iterator[TickRecord]:
+    def ticks(self) -> tuple[TickRecord, ...]:
+        return _ticks(self)
+
+    def _ticks(self) -> Iterator[TickRecord]:
         rng = np.random.default_rng(self.seed)
         count = round(self.duration_s / self.info.scene.tick_s) + 1
         cloud: PointCloud | None = None
@@ -199,6 +203,11 @@ class SyntheticRun:
             plan_step=step,
             events=_events(time_s, info.scene.tick_s),
         )
+
+
+@lru_cache(maxsize=8)
+def _ticks(run: SyntheticRun) -> tuple[TickRecord, ...]:
+    return tuple(run._ticks())
 
 
 def flap_surface(lift: float, stuck: float, grid: int = 25) -> Surface:
@@ -298,17 +307,26 @@ def _arms(time_s: float, scene: Scene) -> dict[ArmName, ArmObservation]:
     return arms
 
 
+_BACKDROP = np.stack(
+    [
+        np.tile(np.linspace(170, 200, 240)[:, None], (1, 320)),
+        np.tile(np.linspace(80, 95, 240)[:, None], (1, 320)),
+        np.tile(np.linspace(80, 96, 320)[None], (240, 1)),
+    ],
+    axis=-1,
+).astype(np.uint8)
+
+
 def _image(stamp_s: float, seen: float, with_depth: bool) -> CameraImage:
     """A red field with a green disc, as large as the region that is seen."""
-    row, column = np.mgrid[0:120, 0:160]
-    rgb = np.empty((120, 160, 3), np.uint8)
-    rgb[...] = np.stack([170 + row // 4, 80 + row // 8, 80 + column // 10], axis=-1)
-    rgb[np.hypot(row - 60, column - 80) < 40 * seen] = (40, 190, 160)
+    row, column = np.mgrid[0:240, 0:320]
+    rgb = _BACKDROP.copy()
+    rgb[np.hypot(row - 120, column - 160) < 80 * seen] = (40, 190, 160)
     return CameraImage(
         stamp_s=stamp_s,
         rgb=rgb,
-        depth_m=0.2 + row / 1000.0 if with_depth else None,
-        intrinsics=np.array([[160.0, 0.0, 80.0], [0.0, 160.0, 60.0], [0.0, 0.0, 1.0]]),
+        depth_m=0.2 + row / 2000.0 if with_depth else None,
+        intrinsics=np.array([[320.0, 0.0, 160.0], [0.0, 320.0, 120.0], [0.0, 0.0, 1.0]]),
         tissue_from_camera=Pose(np.array([-0.17, 0.0, 0.12])),
     )
 

@@ -107,7 +107,7 @@ def test_schema_refuses(short_run: SyntheticRun, change: dict[str, object]) -> N
 
 def test_learning_without_a_verdict_is_an_error(short_run: SyntheticRun) -> None:
     record = replace(
-        next(short_run.ticks()), events=(Event(0.0, "learning", "info", "Something was learned."),)
+        short_run.ticks()[0], events=(Event(0.0, "learning", "info", "Something was learned."),)
     )
     recorder = SummaryRecorder()
     recorder.start(short_run.info)
