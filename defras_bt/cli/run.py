@@ -16,7 +16,7 @@ from defras_bt.cli.files import find, find_scene
 from defras_bt.cli.preparation import prepared
 from defras_bt.executive.operation import WORLDS, Operation, operate
 from defras_bt.executive.tree_file import read_tree
-from defras_bt.planning.english import plan_sentences
+from defras_bt.planning.english import plan_text
 from defras_bt.planning.plan import Plan
 from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.progress import EventPrinter, ProgressLine
@@ -60,8 +60,7 @@ def run(
     console = Console(soft_wrap=True, highlight=False)
     preparation = prepared(believed, world, needs_plan, console)
     if preparation.plan is not None:
-        for sentence in plan_sentences(preparation.plan):
-            console.print(f"  {sentence}", markup=False)
+        console.print(plan_text(preparation.plan, reasons=True), markup=False)
     operation = Operation(
         scene=believed,
         actual=truth,
@@ -121,6 +120,5 @@ def stop_on_interrupt() -> Iterator[Callable[[], str | None]]:
 
 
 def _ask(plan: Plan) -> bool:
-    for sentence in plan_sentences(plan):
-        typer.echo(f"  {sentence}")
+    typer.echo(plan_text(plan, reasons=True))
     return typer.confirm("Carry out this plan?", default=False)

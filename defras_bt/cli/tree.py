@@ -8,16 +8,20 @@ import typer
 
 from defras_bt.cli.files import find
 from defras_bt.executive.tree_file import read_tree
-from defras_bt.executive.tree_show import show_tree
+from defras_bt.executive.tree_show import outline_of_spec, show_mermaid, show_text
 
 app = typer.Typer(help="Look at behaviour trees and check them.", no_args_is_help=True)
 Tree = Annotated[str, typer.Argument(help="Tree: a file, or a shipped name.")]
 
 
 @app.command("show")
-def show(tree: Tree = "defras") -> None:
+def show(
+    tree: Tree = "defras",
+    mermaid: Annotated[bool, typer.Option("--mermaid", help="As a Mermaid diagram.")] = False,
+) -> None:
     """Draw a tree in the terminal. Example: defras tree show defras"""
-    typer.echo(show_tree(read_tree(find(tree, "trees"))))
+    outline = outline_of_spec(read_tree(find(tree, "trees")).root)
+    typer.echo(show_mermaid(outline) if mermaid else show_text(outline))
 
 
 @app.command("check")

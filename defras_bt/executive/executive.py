@@ -76,8 +76,8 @@ class Executive:
         board = self._board
         inputs = self._perception.update(self._tick, self._world.observe())
         board.begin_tick(inputs)
-        self._bt.tick()
         self._tell_changes(inputs)
+        self._bt.tick()
         if inputs.time_s >= self._max_time_s and board.outcome is None:
             board.tell("end", f"Stopped after {inputs.time_s:.0f} s without the goal.", "error")
             board.end("not_reached", f"time is over after {inputs.time_s:.0f} s")

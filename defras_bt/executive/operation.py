@@ -11,7 +11,7 @@ import numpy as np
 
 from defras_bt.executive.blackboard import Blackboard, TickInputs
 from defras_bt.executive.context import Context
-from defras_bt.executive.executive import Executive, ExecutiveFailed
+from defras_bt.executive.executive import Executive
 from defras_bt.executive.perception import Perception
 from defras_bt.learning.buffer import KeyframeBuffer
 from defras_bt.learning.inverse import InverseEstimator
