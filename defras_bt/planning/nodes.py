@@ -10,7 +10,7 @@ from pydantic import Field
 from defras_bt.acting.jaw import JAW_TOLERANCE_RAD
 from defras_bt.executive.node import Node, NodeParameters, Role
 from defras_bt.executive.registry import register_node
-from defras_bt.planning.plan import ArmSituation, GridPoint, Plan, Situation
+from defras_bt.planning.plan import MANOEUVRES, ArmSituation, GridPoint, Plan, Situation
 from defras_bt.planning.planner import NoPlan
 from defras_sim.retraction import SEQUENCES
 from defras_sim.worlds.protocol import JAW_OPEN_RAD
@@ -53,6 +53,7 @@ class UsePreoperativePlan(PlanSource):
         if board.preoperative_used:
             return self.fail("used", "the plan from before the operation was used already")
         board.preoperative_used = True
+        board.plan_exposing = tuple(a.name for a in plan.actions if a.name in MANOEUVRES)
         steps = len(plan.actions)
         return self.adopt(plan, f"The plan made before the operation is used: {steps} actions.")
 
@@ -102,7 +103,9 @@ class Replan(PlanSource):
                 jaw_open=arm.jaw_rad >= JAW_OPEN_RAD - JAW_TOLERANCE_RAD,
                 done=grip.done if grip else (),
             )
-        return Situation(arms, frozenset(board.blocked) | skipped, exposing)
+        # Where all of this was done and the region is still hidden, it cannot be the answer.
+        spent = {grip.point for grip in board.grips.values() if set(exposing) <= set(grip.done)}
+        return Situation(arms, frozenset(board.blocked | spent) | skipped, exposing)
 
     def _plan(self, skipped: frozenset[GridPoint], exposing: tuple[str, ...] | None = None) -> Plan:
         situation = self._situation(skipped, exposing or self.parameters.exposing)
@@ -141,7 +144,7 @@ class Replan(PlanSource):
         wanted = self.context.scene.thresholds.roi_visibility
         best: tuple[float, tuple[str, ...]] = (-1.0, self.parameters.exposing)
         for sequence in SEQUENCES:
-            if sequence[: len(done)] != done:
+            if sequence[: len(done)] != done or sequence == done:
                 continue
             rehearsal = self.context.rehearse(self.context.scene, point, sequence)
             seen = rehearsal.best_visibility if rehearsal.force_max_n <= limit_n else 0.0
