@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from py_trees.common import Status
+from pydantic import Field
 
 from defras_bt.acting.jaw import JAW_TIME_OUT_S
 from defras_bt.executive.node import Node, NodeParameters, Role
@@ -15,7 +16,7 @@ from defras_sim.worlds.protocol import JAW_OPEN_RAD, ArmCommand
 class GripUnsafeParameters(NodeParameters):
     """``patience_s``: how long the force may be over its threshold, or unknown."""
 
-    patience_s: float = 0.5
+    patience_s: Annotated[float, Field(ge=0)] = 0.5
 
 
 @register_node

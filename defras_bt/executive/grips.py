@@ -41,6 +41,8 @@ class GripTracker:
             elif not arm.grasped and holding:
                 self._twin.release(name)
                 del self._board.grips[name]
+                # The tissue fell back, and the tip may be anywhere: a new grasp needs a new reach.
+                self._board.at.pop(name, None)
                 self._board.last_learning = None
                 self._board.unexplained = False
                 changed = True

@@ -121,7 +121,7 @@ class GiveUp(Task):
 
     def update(self) -> Status:
         board = self.context.board
-        why = board.no_plan or "no plan leads to the goal any more"
+        why = board.no_plan or board.operator_refused or "no plan leads to the goal any more"
         board.tell("end", f"The goal was not reached: {why}", "error")
         board.end("not_reached", why)
         return self.succeed("gave_up", why)
