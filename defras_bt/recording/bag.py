@@ -1,0 +1,97 @@
+"""``recording.mcap``: what was measured and commanded, as standard ROS 2 messages."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from defras_bt.recording import ros_messages as ros
+from defras_bt.recording.mcap_file import McapFile
+from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
+from defras_sim.worlds.protocol import ArmObservation
+
+# A killed process loses at most the messages of so many ticks; see mcap_file for the rest.
+_FLUSH_EVERY = 20
+
+
+class BagRecorder:
+    """Writes ``path`` with the topics of the documentation of recordings.
+
+    A message is logged at the world time of its tick and stamped with the world time at which it
+    was measured; a reading is written once, however many ticks it stays the latest.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file: McapFile | None = None
+        self._channels: dict[str, int] = {}
+        self._stamps: dict[str, float] = {}
+
+    def start(self, info: RunInfo) -> None:
+        self._file = McapFile(self._path)
+
+    def tick(self, record: TickRecord) -> None:
+        now_s, seen = record.time_s, record.observation
+        for name, arm in seen.arms.items():
+            self._write_arm(f"/{name.upper()}", now_s, arm)
+        if seen.cloud is not None and self._is_new("/tissue/points", seen.cloud.stamp_s):
+            stamp_s = seen.cloud.stamp_s
+            message = ros.cloud_message(stamp_s, seen.cloud.points_m)
+            self._write("/tissue/points", ros.CLOUD, now_s, stamp_s, message)
+        visible, topic = seen.roi_visibility, "/endoscope/roi_visibility"
+        if visible is not None and math.isfinite(visible):
+            seen_s = seen.roi_visibility_stamp_s
+            stamp_s = now_s if seen_s is None else seen_s
+            if self._is_new(topic, stamp_s):
+                self._write(topic, ros.NUMBER, now_s, stamp_s, ros.number_message(visible))
+        if record.tick % _FLUSH_EVERY == 0:
+            self._opened().flush()
+
+    def finish(self, summary: RunSummary) -> None:
+        if self._file is not None:
+            self._file.close()
+
+    def _write_arm(self, arm: str, now_s: float, seen: ArmObservation) -> None:
+        stamp_s = seen.stamp_s
+        if not self._is_new(arm, stamp_s):
+            return
+        for topic, pose in (
+            ("measured_cp", seen.tissue_from_tip),
+            ("setpoint_cp", seen.setpoint_tissue_from_tip),
+        ):
+            self._write(f"{arm}/{topic}", ros.POSE, now_s, stamp_s, ros.pose_message(stamp_s, pose))
+        for topic, joints in (
+            ("measured_js", seen.joints),
+            ("setpoint_js", seen.setpoint_joints),
+        ):
+            if joints is not None:
+                message = ros.joint_message(stamp_s, ros.JOINTS, joints)
+                self._write(f"{arm}/{topic}", ros.JOINT, now_s, stamp_s, message)
+        jaw = ros.joint_message(stamp_s, ("jaw",), np.array([seen.jaw_rad]))
+        self._write(f"{arm}/jaw/measured_js", ros.JOINT, now_s, stamp_s, jaw)
+        if seen.grasped is not None:
+            message = ros.flag_message(seen.grasped)
+            self._write(f"{arm}/grasped", ros.FLAG, now_s, stamp_s, message)
+
+    def _is_new(self, reading: str, stamp_s: float) -> bool:
+        if self._stamps.get(reading) == stamp_s:
+            return False
+        self._stamps[reading] = stamp_s
+        return True
+
+    def _write(
+        self, topic: str, message_type: str, now_s: float, stamp_s: float, message: bytes
+    ) -> None:
+        file = self._opened()
+        if topic not in self._channels:
+            definition = ros.definition(message_type)
+            self._channels[topic] = file.add_channel(topic, message_type, definition)
+        times = (ros.nanoseconds(now_s), ros.nanoseconds(stamp_s))
+        file.write(self._channels[topic], *times, message)
+
+    def _opened(self) -> McapFile:
+        if self._file is None:
+            raise RuntimeError("a tick came before the start of the run: call start first")
+        return self._file
