@@ -24,7 +24,6 @@ _REASONS = {
     "start_over": "the manoeuvres still missing cannot follow those already done",
     "required_point": "the plan was asked to use {point}",
     "best_point": "{point} is the best grasp point of all plans this short{distances}",
-    "makes_room": "it makes room for the other arm",
     "grasp_needs_open_jaw": "a closed jaw cannot grasp",
     "only_held_tissue_moves": "only held tissue can be moved",
     "exposes": "the region counts as exposed only after it",

@@ -107,27 +107,25 @@ class Planner:
         raise NoPlan(self.max_horizon, self._obstacles(world, required_grasp))
 
     def _plan_from(self, answer: Answer, attachment_mm: dict[GridPoint, int]) -> Plan:
-        actions = sorted(
-            (_action_from(atom) for atom in answer.shown if atom.name != "because"),
-            key=lambda action: action.time,
-        )
-        reasons = {
-            atom.arguments[2].number: self._reason(atom, attachment_mm)
+        why = {
+            atom.arguments[2].number: atom.arguments[1].name
             for atom in answer.shown
             if atom.name == "because"
         }
+        steps = [atom for atom in answer.shown if atom.name != "because"]
+        steps.sort(key=lambda atom: atom.arguments[3].number)
         return Plan(
-            actions=tuple(actions),
+            actions=tuple(_action_from(step) for step in steps),
             cost=answer.cost,
             proved_shortest=True,
-            reasons=tuple(reasons[action.time] for action in actions),
+            reasons=tuple(
+                self._reason(why[step.arguments[3].number], step, attachment_mm) for step in steps
+            ),
         )
 
-    def _reason(self, because: Symbol, attachment_mm: dict[GridPoint, int]) -> str:
-        point = point_of(because.arguments[0].arguments[2])
-        return reason_sentence(
-            because.arguments[1].name, point, self._roi_mm[point], attachment_mm.get(point)
-        )
+    def _reason(self, reason: str, step: Symbol, attachment_mm: dict[GridPoint, int]) -> str:
+        point = point_of(step.arguments[2])
+        return reason_sentence(reason, point, self._roi_mm[point], attachment_mm.get(point))
 
     def _obstacles(self, world: set[Symbol], required: GridPoint | None) -> list[str]:
         removable = sorted(world)

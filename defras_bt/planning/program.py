@@ -10,6 +10,9 @@ from clingo import Control, Function, Model, Number, Symbol
 
 PROGRAMS = ("asp/retraction.lp", "asp/grasp_choice.lp", "asp/explain.lp")
 
+# Each try is a solve of its own; beyond this an explanation of a huge grid would take minutes.
+MAX_DELETIONS = 60
+
 
 class PlanningTimeout(Exception):
     """A solve took longer than it may. The planner stays usable."""
@@ -84,11 +87,15 @@ class RetractionProgram:
     def conflict(
         self, horizon: int, removable: Sequence[Symbol], budget_s: float
     ) -> tuple[Symbol, ...] | None:
-        """Facts out of ``removable`` that together rule out a plan; None if they do not.
+        """Facts out of ``removable`` that together rule out a plan of at most ``horizon`` actions.
 
-        Only true external atoms can be removable. Those not mentioned stay as they are.
+        None if they do not. Only true external atoms can be removable; the others stay as they
+        are. No fact can be dropped from the answer, except where more than ``MAX_DELETIONS`` would
+        have had to be tried.
         """
         self._aim(horizon)
+        for step in range(1, horizon + 1):  # steps may be left out, so that shorter plans count
+            self._control.assign_external(_numbered("active", step), None)
         for atom in removable:
             self._control.assign_external(atom, None)
         try:
@@ -100,15 +107,19 @@ class RetractionProgram:
 
     def _shrunk(self, core: Sequence[Symbol], budget_s: float) -> tuple[Symbol, ...]:
         """Drop every fact without which the rest still conflicts."""
-        needed, open_ = [], list(core)
-        while open_:
-            candidate = open_.pop(0)
-            smaller = self._core([*needed, *open_], budget_s)
+        needed: list[Symbol] = []
+        untried = list(core)
+        for _ in range(MAX_DELETIONS):
+            if not untried:
+                break
+            candidate = untried.pop(0)
+            smaller = self._core([*needed, *untried], budget_s)
             if smaller is None:
                 needed.append(candidate)
             else:
-                open_ = [atom for atom in open_ if atom in set(smaller)]
-        return tuple(needed)
+                kept = set(smaller)
+                untried = [atom for atom in untried if atom in kept]
+        return (*needed, *untried)
 
     def _core(self, assumed: Sequence[Symbol], budget_s: float) -> tuple[Symbol, ...] | None:
         """Assumptions that clingo used to refute all plans; None if there is a plan."""
