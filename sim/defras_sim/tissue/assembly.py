@@ -49,7 +49,7 @@ class ElasticBody:
         self.mu_pa = np.broadcast_to(np.asarray(mu_pa, dtype=float), count).copy()
         self.lam_pa = np.broadcast_to(np.asarray(lam_pa, dtype=float), count).copy()
         self._code = materials.CODES[material]
-        rule = rule or quadrature(mesh.element)
+        rule = rule or quadrature(mesh.element, mesh.cells_xyz)
         self._values = shape_values(mesh.element, rule.points)
         self._gradients, self._volumes = _rest_gradients(mesh, rule)
         self.pattern, self._places = _pattern(mesh.connectivity, len(mesh.nodes_m))
@@ -84,15 +84,6 @@ class ElasticBody:
             entries,
         )
         return entries
-
-    def entries_of(self, matrix: sparse.csc_array) -> Floats:
-        """The entries of ``matrix``, which lies within :attr:`pattern`, in its order."""
-        size = self.pattern.shape[0]
-        columns = np.repeat(np.arange(size), np.diff(self.pattern.indptr))
-        keys = columns * size + self.pattern.indices
-        found = matrix.tocoo()
-        places = np.searchsorted(keys, found.col.astype(np.int64) * size + found.row)
-        return np.bincount(places, weights=found.data, minlength=len(keys)).astype(np.float64)
 
     def largest_principal_stress(self, positions_m: Floats) -> PrincipalStress:
         largest, element, point = _largest_principal_stress(

@@ -7,11 +7,12 @@ from scipy import sparse
 
 from defras_sim.geometry import Floats
 from defras_sim.tissue.assembly import ElasticBody
+from defras_sim.tissue.mesh import Integers
 from defras_sim.tissue.springs import Springs
 
 
 class PotentialEnergy:
-    """Elastic energy of ``body`` plus the energy of ``springs`` to ``targets_m`` (p, 3).
+    """Elastic energy of ``body`` plus the energy of ``springs`` to ``targets_m`` (rows, 3).
 
     Unknowns are the nodes' positions (nodes, 3) [m]; the gradient is in N.
     """
@@ -20,7 +21,12 @@ class PotentialEnergy:
         self.body = body
         self.springs = springs
         self.targets_m = targets_m
-        self._spring_entries = body.entries_of(springs.tangent())
+        held = springs.tangent()
+        # Springs may couple nodes of neighbouring elements: the sum's sparsity holds both.
+        self._pattern = _union(body.pattern, held)
+        self._body_places = _places(body.pattern, self._pattern)
+        self._spring_entries = np.zeros(self._pattern.nnz)
+        self._spring_entries[_places(held, self._pattern)] = held.data
 
     def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
         elastic, gradient = self.body.energy_and_gradient(positions_m)
@@ -29,13 +35,33 @@ class PotentialEnergy:
 
     def tangent(self, positions_m: Floats) -> sparse.csc_array:
         """Second derivative (3 nodes, 3 nodes) [N/m], symmetric."""
-        pattern = self.body.pattern
-        entries = self.body.tangent_entries(positions_m)
-        entries += self._spring_entries
+        entries = self._spring_entries.copy()
+        entries[self._body_places] += self.body.tangent_entries(positions_m)
+        pattern = self._pattern
         return sparse.csc_array((entries, pattern.indices, pattern.indptr), shape=pattern.shape)
 
     def force_scale_n(self) -> float:
         """A force that deforms the whole body by its own size: what residuals are compared to."""
-        volume = float(np.prod(np.ptp(self.body.mesh.nodes_m, axis=0)))
-        stiffness = float(np.mean(2 * self.body.mu_pa))
-        return stiffness * volume / float(np.ptp(self.body.mesh.nodes_m, axis=0).max())
+        size = np.ptp(self.body.mesh.nodes_m, axis=0)
+        return float(np.mean(2 * self.body.mu_pa) * np.prod(size) / size.max())
+
+
+def _union(one: sparse.csc_array, other: sparse.csc_array) -> sparse.csc_array:
+    def ones(matrix: sparse.csc_array) -> sparse.csc_array:
+        entries = np.ones(matrix.nnz)
+        return sparse.csc_array((entries, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+    union = sparse.csc_array(ones(one) + ones(other))
+    union.sort_indices()
+    return union
+
+
+def _places(part: sparse.csc_array, whole: sparse.csc_array) -> Integers:
+    """Where the entries of ``part`` stand among those of ``whole``, which holds all of them."""
+    return np.searchsorted(_keys(whole), _keys(part))
+
+
+def _keys(matrix: sparse.csc_array) -> Integers:
+    size = np.int64(matrix.shape[0])
+    columns = np.repeat(np.arange(size), np.diff(matrix.indptr))
+    return columns * size + matrix.indices

@@ -12,29 +12,41 @@ from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import RIGID_HOLE_N_PER_M, ElementName, MaterialName, Scene
 from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.equilibrium import PotentialEnergy
+from defras_sim.tissue.hole_response import HoleResponse
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import Integers, slab_mesh
 from defras_sim.tissue.solver import NewtonSettings, NewtonSolver
-from defras_sim.tissue.springs import DISC_WEIGHTS, Springs, disc_points, joined
+from defras_sim.tissue.springs import (
+    ROW_SHIFTS,
+    ROWS,
+    Springs,
+    disc_rows,
+    joined,
+    net_force,
+    net_moment,
+)
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.surface import surface_map
 
 # Stiff enough that a patch under 1 N gives 0.1 mm, soft enough not to spoil the conditioning.
 GRASP_N_PER_M = 1e4
 GRASP_REACH_M = 0.008
-_POINTS = len(DISC_WEIGHTS)
+# Of the tip between two equilibria on the way to a far one; and of Newton's method on that way.
+MAX_TIP_STEP_M = 0.004
+MAX_ITERATIONS = 200
 
 
 @dataclass(frozen=True)
 class Grasp:
-    """A held patch: its springs, and where their targets lie seen from the tip (points, 3)."""
+    """A held patch: its springs, and their targets (3, 3) as seen from the tip."""
 
     springs: Springs
-    tip_from_points_m: Floats
+    tip_targets_m: Floats
     tissue_from_tip: Pose
 
     def targets_m(self) -> Floats:
-        return self.tissue_from_tip.apply(self.tip_from_points_m)
+        pose = self.tissue_from_tip
+        return self.tip_targets_m @ pose.rotation.T + ROW_SHIFTS[:, None] * pose.position_m
 
 
 @dataclass(frozen=True)
@@ -70,14 +82,10 @@ class TissueModel:
         mu, lam = lame_parameters(name, tissue.young_modulus_pa, tissue.poisson_ratio)
         self._body = ElasticBody(self.mesh, name, mu, lam)
         self._surface = surface_map(self.mesh, tissue)
-        holes = [
-            disc_points(xy, scene.attachments.hole_radius_m, -tissue.thickness_m)
-            for xy in scene.holes_xy_m
-        ]
-        self._hole_points_m = np.clip(
-            np.concatenate(holes), self.mesh.nodes_m.min(axis=0), self.mesh.nodes_m.max(axis=0)
+        self._hole_rows = disc_rows(
+            self.mesh, scene.holes_xy_m, scene.attachments.hole_radius_m, -tissue.thickness_m
         )
-        self._hole_interpolation = self.mesh.interpolation(self._hole_points_m)
+        self._hole_targets_m = self._hole_rows @ self.mesh.nodes_m
         self._hole_stiffness = np.where(scene.attached, RIGID_HOLE_N_PER_M, 0.0)
         self._positions_m = self.mesh.nodes_m.copy()
         self._grasps: dict[str, Grasp] = {}
@@ -123,9 +131,10 @@ class TissueModel:
         radius = self.scene.grasp.patch_radius_m
         half = np.array([self.scene.tissue.length_x_m, self.scene.tissue.width_y_m]) / 2
         center = np.clip(center, radius - half, half - radius)
-        interpolation = self.mesh.interpolation(disc_points(center, radius, 0.0))
-        springs = Springs(interpolation, GRASP_N_PER_M * DISC_WEIGHTS)
-        held = tissue_from_tip.inverse().apply(interpolation @ self._positions_m)
+        rows = disc_rows(self.mesh, center[None], radius, 0.0)
+        springs = Springs(rows, np.full(ROWS, GRASP_N_PER_M))
+        shifted = rows @ self._positions_m - ROW_SHIFTS[:, None] * tissue_from_tip.position_m
+        held = shifted @ tissue_from_tip.rotation
         self._grasps[arm] = Grasp(springs, held, tissue_from_tip)
         self._energy = self._assembled()
 
@@ -160,8 +169,8 @@ class TissueModel:
     def solve(self, tips: Mapping[str, Pose]) -> TissueState:
         """Equilibrium with each holding arm's tip at its pose in ``tips`` (tissue_from_tip).
 
-        Long ways are gone in steps of some millimetres, and halved where a step fails. If no step
-        is short enough, the state is the last good one, marked as not converged.
+        Long ways are gone in steps of some millimetres, halved where a step fails. If that does
+        not help, the state is the last good one on the way, marked as not converged.
 
         Raises:
             ValueError: a holding arm has no pose, a pose is not finite, or an arm holds nothing.
@@ -183,13 +192,16 @@ class TissueModel:
             if solution.converged:
                 self._positions_m = solution.positions_m
                 share, step = aim, step * 1.5
-                if share >= 1.0 - 1e-12:
+                if share >= 1.0:
                     break
-                continue
+                if iterations <= MAX_ITERATIONS:
+                    continue
+                converged = False
+                break
             self._positions_m, self._grasps = before
             self._solver.forget()
             step *= 0.5
-            if step < smallest:
+            if step < smallest or iterations > MAX_ITERATIONS:
                 converged = False
                 break
         self._energy.targets_m = self._targets_m()
@@ -201,27 +213,41 @@ class TissueModel:
         At an equilibrium the gradient g(x, k) stays zero, so dx/dk = -K^-1 dg/dk.
         """
         x = self._positions_m
-        stretch = self._hole_interpolation @ x - self._hole_points_m
-        size = x.size
-        columns = np.zeros((size, len(holes)))
+        stretch = self._hole_rows @ x - self._hole_targets_m
+        columns = np.zeros((x.size, len(holes)))
         for column, hole in enumerate(np.asarray(holes, dtype=np.int64)):
-            rows = slice(_POINTS * hole, _POINTS * (hole + 1))
-            weighted = DISC_WEIGHTS[:, None] * stretch[rows]
-            columns[:, column] = (self._hole_interpolation[rows].T @ weighted).ravel()
+            rows = slice(ROWS * hole, ROWS * (hole + 1))
+            columns[:, column] = (self._hole_rows[rows].T @ stretch[rows]).ravel()
         change = -self._solver.solve_tangent(self._energy.tangent(x), columns)
         by_node = change.reshape(len(x), 3 * len(holes))
         surface = self._surface.from_nodes @ by_node
         return surface.reshape(-1, 3, len(holes))
 
+    def response_to_hole_forces(self, holes: Integers) -> HoleResponse:
+        """Linear response of the surface and of ``holes`` to a force at each of ``holes``."""
+        x = self._positions_m
+        chosen = np.asarray(holes, dtype=np.int64)
+        means = ROWS * chosen
+        on_holes = self._hole_rows[means].toarray()
+        stretch = on_holes @ x - self._hole_targets_m[means]
+        forces = np.kron(on_holes.T, np.eye(3))
+        motion = self._solver.solve_tangent(self._energy.tangent(x), forces)
+        by_node = motion.reshape(len(x), -1)
+        shape = (3, len(chosen), 3)
+        return HoleResponse(
+            (self._surface.from_nodes @ by_node).reshape(-1, *shape),
+            (on_holes @ by_node).reshape(-1, *shape),
+            stretch,
+        )
+
     def _assembled(self) -> PotentialEnergy:
-        per_point = (self._hole_stiffness[:, None] * DISC_WEIGHTS).ravel()
-        springs = [Springs(self._hole_interpolation, per_point)]
+        springs = [Springs(self._hole_rows, np.repeat(self._hole_stiffness, ROWS))]
         springs += [grasp.springs for grasp in self._grasps.values()]
         return PotentialEnergy(self._body, joined(springs), self._targets_m())
 
     def _targets_m(self) -> Floats:
         held = [grasp.targets_m() for grasp in self._grasps.values()]
-        return np.concatenate([self._hole_points_m, *held])
+        return np.concatenate([self._hole_targets_m, *held])
 
     def _move_tip(self, arm: str, tissue_from_tip: Pose) -> None:
         self._grasps[arm] = replace(self._grasps[arm], tissue_from_tip=tissue_from_tip)
@@ -252,31 +278,29 @@ class TissueModel:
 
     def _state(self, converged: bool, iterations: int) -> TissueState:
         x = self._positions_m
-        forces = self._energy.springs.forces(x, self._energy.targets_m)
-        holes = len(self._hole_stiffness)
-        at_holes = forces[: holes * _POINTS].reshape(holes, _POINTS, 3).sum(axis=1)
+        springs, targets = self._energy.springs, self._energy.targets_m
+        forces = springs.forces(x, targets)
+        held = springs.rows @ x
+        holes = len(self._hole_stiffness) * ROWS
         grasp_forces, grasp_moments = {}, {}
         for number, (arm, grasp) in enumerate(self._grasps.items()):
-            rows = slice((holes + number) * _POINTS, (holes + number + 1) * _POINTS)
-            levers = grasp.springs.points @ x - grasp.tissue_from_tip.position_m
-            grasp_forces[arm] = forces[rows].sum(axis=0)
-            grasp_moments[arm] = np.cross(levers, forces[rows]).sum(axis=0)
+            mine = slice(holes + number * ROWS, holes + (number + 1) * ROWS)
+            tip_m = grasp.tissue_from_tip.position_m
+            grasp_forces[arm] = net_force(forces[mine])[0]
+            grasp_moments[arm] = net_moment(forces[mine], held[mine], tip_m)[0]
         peak = self._body.largest_principal_stress(x)
         return TissueState(
             nodes_m=x.copy(),
             surface=self._surface.surface(x),
             grasp_forces_n=grasp_forces,
             grasp_moments_nm=grasp_moments,
-            attachment_forces_n=at_holes,
+            attachment_forces_n=net_force(forces[:holes]),
             largest_principal_stress_pa=peak.largest_pa,
             stress_at_m=peak.position_m,
             strain_energy_j=self._body.energy_and_gradient(x)[0],
             converged=converged,
             iterations=iterations,
         )
-
-
-MAX_TIP_STEP_M = 0.004
 
 
 def _refine(model: TissueModel, rest_xy_m: Floats, tip_m: Floats) -> tuple[Floats, float]:

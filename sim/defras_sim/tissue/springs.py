@@ -1,7 +1,10 @@
-"""Springs between material points and places in space: how attachments and grasps hold the tissue.
+"""Springs between material patches and places in space: how attachments and grasps hold the tissue.
 
-Points are interpolated in the mesh, so that refining it changes neither what is held nor how
-firmly. A disc is seven such points; together they resist translation and rotation.
+A disc is held by its mean position and its two first moments: what is needed to resist translation
+and rotation, and no more. They are interpolated in the mesh, so that refining it changes neither
+what is held nor how firmly. (Holding every point of the disc as firmly stiffens coarse meshes,
+where the whole element has to follow: 8x8x1 elements then read 23 % too much force, instead of
+10 %, after a pull of 40 mm, and lie 2.3 mm off after a fold of 50 mm, instead of 0.9 mm.)
 """
 
 from __future__ import annotations
@@ -12,50 +15,81 @@ import numpy as np
 from scipy import sparse
 
 from defras_sim.geometry import Floats
+from defras_sim.tissue.mesh import Mesh
 
 # Seven-point rule of degree 5 for the mean over the unit disc (Radon 1948): the centre, and six
 # points on a circle.
 _ANGLES = np.arange(6) * np.pi / 3
-DISC_POINTS: Floats = np.vstack(
+_POINTS: Floats = np.vstack(
     [np.zeros((1, 2)), np.sqrt(2 / 3) * np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])]
 )
-DISC_WEIGHTS: Floats = np.array([0.25] + [0.125] * 6)
+_WEIGHTS: Floats = np.array([0.25] + [0.125] * 6)
 
-
-def disc_points(center_xy_m: Floats, radius_m: float, height_m: float) -> Floats:
-    """Quadrature points (7, 3) of a disc at height z, weighted by :data:`DISC_WEIGHTS`."""
-    xy = np.asarray(center_xy_m) + radius_m * DISC_POINTS
-    return np.column_stack([xy, np.full(len(xy), height_m)])
+# Rows of a disc: mean, and first moments along x and y, orthonormal over the disc, so that each
+# takes the patch's stiffness in N/m.
+ROWS = 3
+_MOMENTS: Floats = np.stack([np.ones(7), 2 * _POINTS[:, 0], 2 * _POINTS[:, 1]]) * _WEIGHTS
+# Only the mean moves with a translation.
+ROW_SHIFTS: Floats = np.array([1.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
 class Springs:
-    """``points`` (p, nodes) interpolates the held points; ``stiffness_n_per_m`` (p,)."""
+    """Linear springs on weighted means of positions.
 
-    points: sparse.csr_array
+    ``rows`` (r, nodes) gives the held quantities (r, 3) [m]; ``stiffness_n_per_m`` (r,).
+    """
+
+    rows: sparse.csr_array
     stiffness_n_per_m: Floats
 
     def forces(self, positions_m: Floats, targets_m: Floats) -> Floats:
-        """Force (p, 3) of each spring on the tissue, at nodes (n, 3) and targets (p, 3)."""
-        stretch = targets_m - self.points @ positions_m
-        return self.stiffness_n_per_m[:, None] * stretch
+        """Generalised force (r, 3) [N] of each spring on the tissue."""
+        return self.stiffness_n_per_m[:, None] * (targets_m - self.rows @ positions_m)
 
     def energy_and_gradient(self, positions_m: Floats, targets_m: Floats) -> tuple[float, Floats]:
-        """Energy [J] and its gradient (nodes, 3)."""
-        stretch = targets_m - self.points @ positions_m
+        """Energy [J] and its gradient (nodes, 3) [N]."""
+        stretch = targets_m - self.rows @ positions_m
         force = self.stiffness_n_per_m[:, None] * stretch
-        return 0.5 * float(np.sum(force * stretch)), -(self.points.T @ force)
+        return 0.5 * float(np.sum(force * stretch)), -(self.rows.T @ force)
 
     def tangent(self) -> sparse.csc_array:
-        """Second derivative (3 nodes, 3 nodes): constant."""
-        scaled = self.points.multiply(self.stiffness_n_per_m[:, None])
-        scalar = sparse.csc_array(self.points.T @ scaled)
+        """Second derivative (3 nodes, 3 nodes) [N/m]: constant."""
+        acting = self.stiffness_n_per_m > 0
+        rows = self.rows[acting]
+        scaled = rows.multiply(self.stiffness_n_per_m[acting, None])
+        scalar = sparse.csc_array(rows.T @ scaled)
         return sparse.csc_array(sparse.kron(scalar, np.eye(3), format="csc"))
+
+
+def disc_rows(
+    mesh: Mesh, centers_xy_m: Floats, radius_m: float, height_m: float
+) -> sparse.csr_array:
+    """Rows (3 discs, nodes) of discs around ``centers_xy_m`` (discs, 2) at height z.
+
+    A disc that reaches over the slab's edge is squeezed into the slab.
+    """
+    xy = np.asarray(centers_xy_m, dtype=float)[:, None, :] + radius_m * _POINTS
+    points = np.concatenate([xy, np.full((*xy.shape[:2], 1), height_m)], axis=2).reshape(-1, 3)
+    box = mesh.nodes_m.min(axis=0), mesh.nodes_m.max(axis=0)
+    moments = sparse.kron(sparse.eye_array(len(xy)), _MOMENTS, format="csr")
+    return sparse.csr_array(moments @ mesh.interpolation(np.clip(points, *box)))
+
+
+def net_force(forces_n: Floats) -> Floats:
+    """Force (discs, 3) of discs from their springs' forces (3 discs, 3)."""
+    return forces_n.reshape(-1, ROWS, 3)[:, 0]
+
+
+def net_moment(forces_n: Floats, held_m: Floats, about_m: Floats) -> Floats:
+    """Moment (discs, 3) [Nm] about a point, with the held quantities ``held_m`` (3 discs, 3)."""
+    levers = held_m.reshape(-1, ROWS, 3) - ROW_SHIFTS[:, None] * about_m
+    return np.cross(levers, forces_n.reshape(-1, ROWS, 3)).sum(axis=1)
 
 
 def joined(parts: list[Springs]) -> Springs:
     """All springs as one set, in order."""
     return Springs(
-        sparse.csr_array(sparse.vstack([part.points for part in parts], format="csr")),
+        sparse.csr_array(sparse.vstack([part.rows for part in parts], format="csr")),
         np.concatenate([part.stiffness_n_per_m for part in parts]),
     )

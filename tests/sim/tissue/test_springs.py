@@ -1,0 +1,65 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from defras_sim.scene import Tissue
+from defras_sim.tissue.mesh import slab_mesh
+from defras_sim.tissue.springs import Springs, disc_rows, joined, net_force, net_moment
+
+CENTER = np.array([[0.011, -0.02]])
+
+
+def slab(cells=(8, 8, 1)):
+    return slab_mesh(Tissue(), "hexahedron20", cells)
+
+
+def test_moments_of_a_disc_are_exact():
+    mesh = slab()
+    x = mesh.nodes_m
+    rows = disc_rows(mesh, CENTER, 0.004, 0.0)
+    # Over a disc of radius r, the mean of 2 (x - x0) / r times x is r / 2.
+    expected = [[0.011, -0.02, 0.0], [0.002, 0.0, 0.0], [0.0, 0.002, 0.0]]
+    np.testing.assert_allclose(rows @ x, expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("cells", [(8, 8, 1), (12, 12, 1), (5, 7, 2)])
+def test_a_disc_pulls_and_turns_with_its_stiffness_whatever_the_mesh(cells):
+    mesh = slab(cells)
+    rows = disc_rows(mesh, CENTER, 0.005, 0.0)
+    springs = Springs(rows, np.full(3, 500.0))
+    about = np.array([*CENTER[0], 0.0])
+    angle = 1e-6
+    turn = Rotation.from_rotvec([0.0, angle, 0.0]).as_matrix()
+    goal = rows @ ((mesh.nodes_m - about) @ turn.T + about + [0.0, 0.0, 0.002])
+    forces = springs.forces(mesh.nodes_m, goal)
+    np.testing.assert_allclose(net_force(forces), [[0, 0, 1.0]], atol=1e-12)
+    # k r^2 / 4 per radian about a diameter: the mean of the squared lever over the disc.
+    moment = net_moment(forces, rows @ mesh.nodes_m, about)[0]
+    assert moment[1] == pytest.approx(500.0 * 0.005**2 / 4 * angle, rel=1e-5)
+
+
+def test_a_disc_at_the_edge_stays_in_the_slab():
+    rows = disc_rows(slab(), np.array([[0.06, 0.06]]), 0.005, -0.005)
+    np.testing.assert_allclose(rows.sum(axis=1), [1, 0, 0], atol=1e-12)
+
+
+def test_gradient_and_tangent_are_slopes():
+    mesh = slab((4, 4, 1))
+    springs = joined(
+        [
+            Springs(disc_rows(mesh, CENTER, 0.004, 0.0), np.full(3, 300.0)),
+            Springs(disc_rows(mesh, -CENTER, 0.004, -0.005), np.full(3, 1e4)),
+        ]
+    )
+    rng = np.random.default_rng(0)
+    targets = rng.normal(0, 0.02, (6, 3))
+    x = mesh.nodes_m + rng.normal(0, 0.001, mesh.nodes_m.shape)
+    step = rng.normal(0, 1e-6, x.shape)
+    (up, up_slope), (down, down_slope) = (
+        springs.energy_and_gradient(x + s, targets) for s in (step, -step)
+    )
+    _, slope = springs.energy_and_gradient(x, targets)
+    assert np.sum(slope * step) * 2 == pytest.approx(up - down, rel=1e-8)
+    np.testing.assert_allclose(
+        springs.tangent() @ step.ravel() * 2, (up_slope - down_slope).ravel(), atol=1e-12
+    )
