@@ -9,7 +9,7 @@ import numpy as np
 from defras_bt.executive.blackboard import TickInputs
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
-from defras_sim.worlds.protocol import ArmCommand, ArmObservation, Command
+from defras_sim.worlds.protocol import HOLD, ArmCommand, ArmObservation, Command, Observation
 
 # Tips may not go deeper than the grasp depth plus this, nor farther out than the slab plus this.
 BELOW_SURFACE_M = 0.003
@@ -28,8 +28,9 @@ class GateVerdict:
 class CommandGate:
     """Scales, clips or zeroes each command from the tick's inputs alone.
 
-    Motion is zero on any trip. Jaws may still move on a trip that concerns only force or shape,
-    so that the tree can let go of tissue on the spot; without sensors they keep their grip.
+    Motion of every arm is zero on any trip. Where force or shape trip, jaws may still move, so that
+    the tree can let go of tissue on the spot; where sensors, operator or the command itself do,
+    every jaw keeps its grip.
     """
 
     def __init__(self, scene: Scene, metric: str | None) -> None:
@@ -44,39 +45,32 @@ class CommandGate:
         self, proposed: Command, rate: float, inputs: TickInputs, trip: str | None = None
     ) -> GateVerdict:
         """The command that may leave. ``trip``: a reason that the executive knows of."""
-        reasons = self._trips(inputs, trip)
-        if not (np.isfinite(rate) and 0.0 <= rate <= 1.0):
-            reasons.append(f"rate {rate} is not between 0 and 1")
-        blind = bool(trip or inputs.missing or inputs.operator_stop)
-        holding = any(arm.grasped for arm in inputs.observation.arms.values())
-        arms = {}
-        for name, command in proposed.arms.items():
-            if name not in inputs.observation.arms:
-                reasons.append(f"{name} is not an arm of this set-up")
-                continue
-            observed = inputs.observation.arms[name]
-            if not _finite(command):
-                reasons.append(f"the command for {name} is not a number")
-                continue
-            if reasons:
-                arms[name] = ArmCommand(jaw_rad=None if blind else command.jaw_rad)
-                continue
-            arms[name] = self._limited(command, rate, observed, holding)
-        return GateVerdict(Command(arms), tuple(reasons))
+        blind = [*_blindness(inputs, trip), *_faults(proposed, rate, inputs.observation)]
+        tissue = self._tissue_trips(inputs)
+        if blind:
+            return GateVerdict(HOLD, (*blind, *tissue))
+        if tissue:
+            jaws = {name: ArmCommand(jaw_rad=arm.jaw_rad) for name, arm in proposed.arms.items()}
+            return GateVerdict(Command(jaws), tuple(tissue))
+        observed = inputs.observation.arms
+        holding = any(arm.grasped for arm in observed.values())
+        arms = {
+            name: self._limited(command, rate, observed[name], holding)
+            for name, command in proposed.arms.items()
+        }
+        return GateVerdict(Command(arms), ())
 
-    def _trips(self, inputs: TickInputs, trip: str | None) -> list[str]:
-        reasons = [trip] if trip else []
-        reasons += inputs.missing
-        if inputs.operator_stop:
-            reasons.append(inputs.operator_stop)
+    def _tissue_trips(self, inputs: TickInputs) -> list[str]:
+        """What speaks against moving tissue, but not against letting it go."""
+        reasons = []
         if np.isnan(inputs.force_n):
             reasons.append("the force estimate is missing")
-        if self._metric is not None and inputs.reading is not None:
-            state = inputs.reading.warning_state[self._metric]
-            if np.isnan(inputs.reading.mu_m[self._metric]):
+        if self._metric is not None:
+            reading = inputs.reading
+            if reading is None or np.isnan(reading.mu_m[self._metric]):
                 reasons.append("the discrepancy is unknown")
-            elif state >= 2:
-                reasons.append(f"the warning state is {state}")
+            elif reading.warning_state[self._metric] >= 2:
+                reasons.append(f"the warning state is {reading.warning_state[self._metric]}")
         return reasons
 
     def _limited(
@@ -96,6 +90,28 @@ class CommandGate:
             _clipped(command.angular_rad_s, 1.0) * rate,
             command.jaw_rad,
         )
+
+
+def _blindness(inputs: TickInputs, trip: str | None) -> list[str]:
+    """Reasons to touch nothing, jaws included."""
+    stops = (trip, *inputs.missing, inputs.operator_stop)
+    return [stop for stop in stops if stop]
+
+
+def _faults(proposed: Command, rate: float, observation: Observation) -> list[str]:
+    """What is wrong with the command itself: one fault, and nothing of it is trusted."""
+    faults = []
+    if not 0.0 <= rate <= 1.0:
+        faults.append(f"rate {rate} is not between 0 and 1")
+    for name, command in proposed.arms.items():
+        observed = observation.arms.get(name)
+        if observed is None:
+            faults.append(f"{name} is not an arm of this set-up")
+        elif not _finite(command):
+            faults.append(f"the command for {name} is not a number")
+        elif not np.all(np.isfinite(observed.setpoint_tissue_from_tip.position_m)):
+            faults.append(f"the set-point of {name} is not a number")
+    return faults
 
 
 def _clipped(vector: Floats, limit: float) -> Floats:

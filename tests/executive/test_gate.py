@@ -1,0 +1,257 @@
+"""Nothing leaves the gate that is too fast, leads out of the workspace, or follows a trip."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from defras_bt.executive.blackboard import TickInputs
+from defras_bt.executive.gate import (
+    ABOVE_TISSUE_M,
+    BELOW_SURFACE_M,
+    BESIDE_TISSUE_M,
+    CommandGate,
+)
+from defras_bt.monitoring.reading import MonitorReading
+from defras_sim.geometry import Pose
+from defras_sim.worlds.protocol import HOLD, ArmCommand, ArmObservation, Command, Observation
+from tests.nodes.bench_services import flat_state
+from tests.nodes.bench_world import bench_scene
+
+SCENE = bench_scene()
+GATE = CommandGate(SCENE, "local")
+NAN = float("nan")
+UP = np.array([0.0, 0.0, 1.0])
+HALF_M = 0.06 + BESIDE_TISSUE_M
+
+
+def arm(tip_m=(0.0, 0.03, 0.03), grasped=False) -> ArmObservation:
+    tip = Pose(np.array(tip_m, float))
+    return ArmObservation(0.0, tip, tip, 0.0, grasped)
+
+
+def reading(state: int = 0, mu_m: float = 0.0005) -> MonitorReading:
+    return MonitorReading(0.0, {"local": mu_m}, {"local": state})
+
+
+def inputs(arms=None, **says) -> TickInputs:
+    """Inputs that trip nothing, except for what the test says."""
+    arms = {"psm1": arm(), "psm2": arm((0.0, -0.03, 0.03))} if arms is None else arms
+    plain = TickInputs(
+        tick=0,
+        time_s=0.0,
+        observation=Observation(0.0, arms),
+        missing=(),
+        twin=flat_state(),
+        force_n=0.1,
+        force_threshold_n=0.3,
+        reading=reading(),
+    )
+    return replace(plain, **says)
+
+
+def go(velocity=0.01 * UP, jaw_rad=0.8, **other) -> Command:
+    return Command({"psm1": ArmCommand(np.array(velocity, float), jaw_rad=jaw_rad, **other)})
+
+
+def speed_m_s(command: Command, name: str = "psm1") -> float:
+    return float(np.linalg.norm(command.arms.get(name, ArmCommand()).linear_m_s))
+
+
+class TestWithoutTrip:
+    """Speed, rate and workspace."""
+
+    def test_a_slow_command_passes_unchanged(self):
+        verdict = GATE.check(go(), 1.0, inputs())
+        sent = verdict.command.arms["psm1"]
+        np.testing.assert_allclose(sent.linear_m_s, 0.01 * UP)
+        assert sent.jaw_rad == 0.8
+        assert verdict.reasons == ()
+
+    @pytest.mark.parametrize(
+        ("grasped", "limit"),
+        [(False, SCENE.motion.reach_speed_m_s), (True, SCENE.motion.tissue_speed_m_s)],
+    )
+    def test_a_fast_one_is_clipped_and_keeps_its_direction(self, grasped, limit):
+        velocity = np.array([0.3, -0.4, 1.2])
+        verdict = GATE.check(go(velocity), 1.0, inputs({"psm1": arm(grasped=grasped)}))
+        sent = verdict.command.arms["psm1"].linear_m_s
+        np.testing.assert_allclose(sent, velocity * limit / 1.3)
+
+    def test_while_one_arm_holds_tissue_the_other_is_slow_too(self):
+        held = {"psm1": arm(), "psm2": arm((0.0, -0.03, 0.03), grasped=True)}
+        verdict = GATE.check(go(1.0 * UP), 1.0, inputs(held))
+        assert speed_m_s(verdict.command) == pytest.approx(SCENE.motion.tissue_speed_m_s)
+
+    @pytest.mark.parametrize("rate", [0.0, 0.5, 1.0])
+    def test_the_rate_scales_slow_and_clipped_commands_alike(self, rate):
+        for proposed, full in ((0.01, 0.01), (1.0, SCENE.motion.reach_speed_m_s)):
+            verdict = GATE.check(go(proposed * UP), rate, inputs())
+            assert speed_m_s(verdict.command) == pytest.approx(rate * full)
+
+    def test_turning_is_limited_and_scaled_too(self):
+        command = go(angular_rad_s=np.array([3.0, 0.0, 4.0]))
+        sent = GATE.check(command, 0.5, inputs()).command.arms["psm1"].angular_rad_s
+        np.testing.assert_allclose(sent, [0.3, 0.0, 0.4])
+
+    @pytest.mark.parametrize("axis", [0, 1, 2])
+    @pytest.mark.parametrize("side", [-1, 1])
+    def test_motion_ends_at_the_wall_of_the_workspace(self, axis, side):
+        low, high = [-HALF_M, -HALF_M, -BELOW_SURFACE_M], [HALF_M, HALF_M, ABOVE_TISSUE_M]
+        wall_m = (low, high)[side > 0][axis]
+        tip_m = np.array([0.0, 0.0, 0.03])
+        tip_m[axis] = wall_m - side * 0.0005
+        velocity = np.zeros(3)
+        velocity[axis] = side * 0.05
+        verdict = GATE.check(go(velocity), 1.0, inputs({"psm1": arm(tip_m)}))
+        moved_m = verdict.command.arms["psm1"].linear_m_s * SCENE.tick_s
+        assert moved_m[axis] == pytest.approx(side * 0.0005)
+
+    def test_from_outside_only_the_way_back_is_open(self):
+        outside = inputs({"psm1": arm((0.0, 0.0, ABOVE_TISSUE_M + 0.01))})
+        assert speed_m_s(GATE.check(go(0.01 * UP), 1.0, outside).command) == 0.0
+        assert speed_m_s(GATE.check(go(-0.01 * UP), 1.0, outside).command) == pytest.approx(0.01)
+
+    def test_outside_in_one_axis_motion_along_the_others_is_free(self):
+        outside = inputs({"psm1": arm((0.0, 0.0, ABOVE_TISSUE_M + 0.01))})
+        verdict = GATE.check(go([0.01, 0.0, 0.01]), 1.0, outside)
+        np.testing.assert_allclose(verdict.command.arms["psm1"].linear_m_s, [0.01, 0.0, 0.0])
+
+
+TISSUE_TRIPS = {
+    "force unknown": ({"force_n": NAN}, "the force estimate is missing"),
+    "warning state 2": ({"reading": reading(2)}, "the warning state is 2"),
+    "warning state 3": ({"reading": reading(3)}, "the warning state is 3"),
+    "mu unknown": ({"reading": reading(0, NAN)}, "the discrepancy is unknown"),
+    "mu unknown in a high state": ({"reading": reading(3, NAN)}, "the discrepancy is unknown"),
+    "no reading": ({"reading": None}, "the discrepancy is unknown"),
+}
+BLIND_TRIPS = {
+    "something is missing": ({"missing": ("no cloud", "psm2 is old")}, "no cloud"),
+    "the operator stops": ({"operator_stop": "the pedal is pressed"}, "the pedal is pressed"),
+}
+
+
+class TestTrips:
+    """On a trip no tip moves."""
+
+    @pytest.mark.parametrize("name", TISSUE_TRIPS)
+    def test_force_and_shape_stop_motion_and_leave_the_jaw_free_to_let_go(self, name):
+        says, reason = TISSUE_TRIPS[name]
+        verdict = GATE.check(go(), 1.0, inputs(**says))
+        assert speed_m_s(verdict.command) == 0.0
+        assert verdict.command.arms["psm1"].jaw_rad == 0.8
+        assert verdict.reasons == (reason,)
+
+    @pytest.mark.parametrize("name", BLIND_TRIPS)
+    def test_without_sensors_or_leave_the_jaw_keeps_its_grip_too(self, name):
+        says, reason = BLIND_TRIPS[name]
+        verdict = GATE.check(go(), 1.0, inputs(**says))
+        assert verdict.command == HOLD
+        assert verdict.reasons[0] == reason
+
+    def test_a_trip_of_the_executive(self):
+        verdict = GATE.check(go(), 1.0, inputs(), trip="the connection is lost")
+        assert (verdict.command, verdict.reasons) == (HOLD, ("the connection is lost",))
+
+    def test_all_reasons_are_given(self):
+        says = {"missing": ("no cloud",), "force_n": NAN, "reading": reading(2)}
+        verdict = GATE.check(go(), 1.0, inputs(**says), trip="lost")
+        assert verdict.reasons == (
+            "lost",
+            "no cloud",
+            "the force estimate is missing",
+            "the warning state is 2",
+        )
+
+    @pytest.mark.parametrize("state", [0, 1])
+    def test_low_warning_states_trip_nothing(self, state):
+        assert GATE.check(go(), 1.0, inputs(reading=reading(state))).reasons == ()
+
+    @pytest.mark.parametrize("read", [None, reading(3), reading(3, NAN)])
+    def test_a_tree_without_monitoring_is_not_stopped_by_it(self, read):
+        verdict = CommandGate(SCENE, None).check(go(), 1.0, inputs(reading=read))
+        assert speed_m_s(verdict.command) == pytest.approx(0.01)
+
+
+class TestFaultyCommands:
+    """One fault, and nothing of the command is trusted, whatever the order of the arms."""
+
+    FAULTS = (
+        {"psm2": ArmCommand(np.array([NAN, 0.0, 0.0]))},
+        {"psm2": ArmCommand(np.array([0.0, float("inf"), 0.0]))},
+        {"psm2": ArmCommand(angular_rad_s=np.array([0.0, 0.0, NAN]))},
+        {"psm2": ArmCommand(jaw_rad=NAN)},
+        {"psm3": ArmCommand()},
+    )
+
+    @pytest.mark.parametrize("fault", FAULTS)
+    @pytest.mark.parametrize("first", [True, False])
+    def test_a_fault_for_one_arm_stops_both(self, fault, first):
+        arms = {**fault, **go().arms} if first else {**go().arms, **fault}
+        verdict = GATE.check(Command(arms), 1.0, inputs())
+        assert verdict.command == HOLD
+        (reason,) = verdict.reasons
+        assert next(iter(fault)) in reason
+
+    @pytest.mark.parametrize("rate", [-0.1, 1.1, NAN, float("inf")])
+    def test_a_rate_that_is_none(self, rate):
+        verdict = GATE.check(go(), rate, inputs())
+        assert verdict.command == HOLD
+        assert "not between 0 and 1" in verdict.reasons[0]
+
+    def test_an_arm_whose_set_point_is_unknown_is_not_moved(self):
+        lost = {"psm1": arm((NAN, 0.0, 0.0))}
+        verdict = GATE.check(go(), 1.0, inputs(lost))
+        assert verdict.command == HOLD
+        assert verdict.reasons == ("the set-point of psm1 is not a number",)
+
+
+def commands_of(arms: list[str], numbers: st.SearchStrategy[float]) -> st.SearchStrategy[Command]:
+    vectors = st.tuples(numbers, numbers, numbers).map(np.array)
+    one = st.builds(ArmCommand, vectors, vectors, st.none() | numbers)
+    return st.dictionaries(st.sampled_from(arms), one).map(Command)
+
+
+fast = commands_of(["psm1", "psm2"], st.floats(-1, 1))
+wild = commands_of(["psm1", "psm2", "psm3"], st.floats(allow_nan=True, allow_infinity=True))
+places = st.tuples(*[st.floats(-0.3, 0.3)] * 3)
+trips = st.sampled_from([*TISSUE_TRIPS.values(), *BLIND_TRIPS.values()]).map(lambda trip: trip[0])
+
+
+@given(
+    proposed=fast | wild,
+    rate=st.floats(0, 1) | st.floats(),
+    tips=st.tuples(places, places),
+    held=st.tuples(st.booleans(), st.booleans()),
+    says=st.just({}) | trips,
+    trip=st.none() | st.just("the connection is lost"),
+)
+@example(go([1e308, 1e308, -1e308]), 1.0, ((0, 0, 0), (0, 0, 0)), (False, False), {}, None)
+def test_whatever_is_proposed(proposed, rate, tips, held, says, trip):
+    """Speed is at most limit times rate, the box is not left, and a trip means motion zero."""
+    arms = {f"psm{i + 1}": arm(tips[i], held[i]) for i in range(2)}
+    with np.errstate(over="ignore"):
+        verdict = GATE.check(proposed, rate, inputs(arms, **says), trip)
+    stopped = bool(says or trip or verdict.reasons)
+    limit = SCENE.motion.tissue_speed_m_s if any(held) else SCENE.motion.reach_speed_m_s
+    low, high = [-HALF_M, -HALF_M, -BELOW_SURFACE_M], [HALF_M, HALF_M, ABOVE_TISSUE_M]
+    assert set(verdict.command.arms) <= set(arms)
+    for name, sent in verdict.command.arms.items():
+        assert np.isfinite(sent.linear_m_s).all()
+        assert np.isfinite(sent.angular_rad_s).all()
+        assert sent.jaw_rad is None or np.isfinite(sent.jaw_rad)
+        if stopped:
+            assert not sent.linear_m_s.any()
+            assert not sent.angular_rad_s.any()
+            continue
+        assert np.linalg.norm(sent.linear_m_s) <= limit * rate + 1e-12
+        assert np.linalg.norm(sent.angular_rad_s) <= rate + 1e-12
+        start = arms[name].setpoint_tissue_from_tip.position_m
+        end = start + sent.linear_m_s * SCENE.tick_s
+        assert (end >= np.minimum(start, low) - 1e-12).all()
+        assert (end <= np.maximum(start, high) + 1e-12).all()
