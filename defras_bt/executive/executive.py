@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import py_trees
 
 from defras_bt.acting.actions import action_leaves
 from defras_bt.executive.blackboard import Blackboard, TickInputs
 from defras_bt.executive.context import Context
-from defras_bt.executive.gate import CommandGate
+from defras_bt.executive.gate import CommandGate, GateVerdict
 from defras_bt.executive.loader import LoadedTree, load_tree
 from defras_bt.executive.perception import Perception
 from defras_bt.executive.statuses import TickedVisitor
@@ -53,6 +54,7 @@ class Executive:
         self._tick = 0
         self._state_before = 0
         self._over_before = False
+        self._stopped_before: tuple[str, ...] = ()
         self._last: TickRecord | None = None
 
     def run(self) -> None:
@@ -66,11 +68,20 @@ class Executive:
             while self._board.outcome is None:
                 self._one_tick()
         except Exception as error:
+            failure = ExecutiveFailed(f"{type(error).__name__}: {error}")
+            self._stop_after(failure)
+            raise failure from error
+
+    def _stop_after(self, failure: ExecutiveFailed) -> None:
+        """Motion zero first; then the outcome, and a last record."""
+        try:
             self._world.command(HOLD)
-            reason = f"{type(error).__name__}: {error}"
-            self._board.end("error", reason)
-            self._record_failure(f"Motion stopped, the grip is kept: {reason}")
-            raise ExecutiveFailed(reason) from error
+        except Exception as error:
+            self._board.end("error", str(failure))
+            self._record_failure(f"The world did not take the order to stop ({error}): {failure}")
+            raise failure from error
+        self._board.end("error", str(failure))
+        self._record_failure(f"Motion stopped, the grip is kept: {failure}")
 
     def _one_tick(self) -> None:
         board = self._board
@@ -82,6 +93,7 @@ class Executive:
             board.tell("end", f"Stopped after {inputs.time_s:.0f} s without the goal.", "error")
             board.end("not_reached", f"time is over after {inputs.time_s:.0f} s")
         verdict = self._gate.check(board.command, board.rate, inputs)
+        self._tell_stopped(verdict)
         sent = verdict.command if board.outcome is None else HOLD
         self._world.command(sent)
         self._record(inputs, sent)
@@ -125,19 +137,36 @@ class Executive:
             )
         self._over_before = over
 
+    def _tell_stopped(self, verdict: GateVerdict) -> None:
+        """Say, once, that the gate stopped motion which the tree had wanted."""
+        wanted = self._board.command.arms.values()
+        moving = any(np.any(arm.linear_m_s) or np.any(arm.angular_rad_s) for arm in wanted)
+        stopped = verdict.reasons if moving else ()
+        if stopped and stopped != self._stopped_before:
+            sentence = f"The command gate stopped motion: {'; '.join(stopped)}."
+            self._board.tell("hold", sentence, "warning")
+        self._stopped_before = stopped
+
     def _record(self, inputs: TickInputs, sent: Command) -> None:
+        true_force_n, true_surface = self._world.true_force_n(), self._world.true_surface()
+        known = self._known(inputs, sent)
+        self._last = replace(known, true_force_n=true_force_n, true_surface=true_surface)
+        self._recorder.tick(self._last)
+
+    def _known(self, inputs: TickInputs, sent: Command) -> TickRecord:
+        """The tick as the executive knows it; what is true only the world knows."""
         board, slot = self._board, self.tree.plan_slot
         snapshot = self._ticked.snapshot(self.tree)
         step = slot.step if slot is not None else None
-        self._last = TickRecord(
+        return TickRecord(
             tick=inputs.tick,
             time_s=inputs.time_s,
             observation=inputs.observation,
             twin=inputs.twin,
             reading=inputs.reading,
             force_n=inputs.force_n,
-            true_force_n=self._world.true_force_n(),
-            true_surface=self._world.true_surface(),
+            true_force_n=None,
+            true_surface=None,
             rate=board.rate,
             proposed=board.command,
             sent=sent,
@@ -148,12 +177,9 @@ class Executive:
             plan_step=step if step is not None else 0,
             events=tuple(board.events),
         )
-        self._recorder.tick(self._last)
 
     def _record_failure(self, sentence: str) -> None:
         """One more record, so that nobody has to guess how the run ended."""
-        if self._last is None:
-            return
-        event = Event(self._last.time_s, "error", "error", sentence)
-        closing = replace(self._last, tick=self._last.tick + 1, sent=HOLD, events=(event,))
-        self._recorder.tick(closing)
+        last = self._last or self._known(self._board.inputs, HOLD)
+        event = Event(last.time_s, "error", "error", sentence)
+        self._recorder.tick(replace(last, tick=last.tick + 1, sent=HOLD, events=(event,)))
