@@ -1,0 +1,63 @@
+"""Pre-operative results as JSON files that know which scene they were made for.
+
+Schema ``defras/preoperative/1``: an object with ``schema`` and ``result``; ``result`` has the
+fields of :class:`~defras_bt.planning.preoperative.PreoperativeResult`, nested ones as objects,
+grasp points as [column, row]. Forces in N, visibility 0..1.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from defras_bt.planning.preoperative import PreoperativeResult
+from defras_bt.planning.scene_hash import scene_hash
+from defras_sim.scene import Scene
+
+SCHEMA: Literal["defras/preoperative/1"] = "defras/preoperative/1"
+
+
+class InvalidPlanFile(ValueError):
+    """The file cannot be read as a plan file."""
+
+
+class StalePlanFile(ValueError):
+    """The scene changed since the plan was made."""
+
+
+class _PlanFile(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    schema_: Literal["defras/preoperative/1"] = Field(alias="schema")
+    result: PreoperativeResult
+
+
+def save_plan(result: PreoperativeResult, file: Path) -> None:
+    """Write ``result``; the folder must exist."""
+    content = _PlanFile(schema=SCHEMA, result=result)
+    file.write_text(content.model_dump_json(by_alias=True, indent=1) + "\n", encoding="utf-8")
+
+
+def load_plan(file: Path, scene: Scene) -> PreoperativeResult:
+    """Read a plan made for ``scene``.
+
+    Raises:
+        InvalidPlanFile: the file is no plan file.
+        StalePlanFile: it was made for other content than ``scene`` has now.
+    """
+    try:
+        result = _PlanFile.model_validate_json(file.read_text(encoding="utf-8")).result
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise InvalidPlanFile(
+            f"{file}: {place}: {first['msg']}; valid are files with schema {SCHEMA}, as "
+            "`defras plan` writes them"
+        ) from error
+    if result.scene_hash != scene_hash(scene):
+        raise StalePlanFile(
+            f"{file}: made for scene {result.scene!r} before it changed; plan again for the scene "
+            f"{scene.name!r} as it is now"
+        )
+    return result
