@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 import typer
@@ -41,6 +42,14 @@ def main() -> None:
     except UserError as error:
         console.print(str(error), style="red", markup=False)
         sys.exit(ExitCode.INVALID)
-    except (ExecutiveFailed, RecordingFailed) as error:
-        console.print(f"internal error: {error}", style="red", markup=False)
+    except Exception as error:
+        if os.environ.get("DEFRAS_DEBUG"):
+            raise
+        what = error if isinstance(error, ExecutiveFailed | RecordingFailed) else _named(error)
+        console.print(f"internal error: {what}", style="red", markup=False)
+        console.print("Set DEFRAS_DEBUG=1 to see where it happened.", style="dim")
         sys.exit(ExitCode.INTERNAL)
+
+
+def _named(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

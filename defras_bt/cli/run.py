@@ -13,19 +13,18 @@ from rich.console import Console
 
 from defras_bt.cli.errors import OUTCOME_CODES, UserError
 from defras_bt.cli.files import find, find_scene
-from defras_bt.cli.preparation import prepared
+from defras_bt.cli.plan import rehearsed, tell
 from defras_bt.executive.operation import WORLDS, Operation, operate
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.planning.english import plan_text
 from defras_bt.planning.plan import Plan
+from defras_bt.planning.preparation import needs_plan
 from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.progress import EventPrinter, ProgressLine
 from defras_bt.recording.record import Recorder
 from defras_bt.recording.report import ReportRecorder
 from defras_bt.recording.summary import SummaryRecorder
 from defras_bt.recording.timeline import TimelineRecorder
-
-EXAMPLE = "Example: defras run demo --actual demo_actual --world bullet --out out/demo"
 
 
 def run(
@@ -35,6 +34,9 @@ def run(
     ] = None,
     world: Annotated[str, typer.Option(help="model (fast) or bullet (PyBullet).")] = "model",
     tree: Annotated[str, typer.Option(help="Tree: a file, or a shipped name.")] = "defras",
+    plan: Annotated[
+        Path | None, typer.Option(help="Plan file of defras plan; default: rehearse now.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for what the run leaves.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same run (model world).")] = 0,
     max_time: Annotated[float, typer.Option(min=1, help="Longest world time in s.")] = 300.0,
@@ -54,13 +56,15 @@ def run(
     if actual is not None and truth.hole_counts != believed.hole_counts:
         raise UserError(f"{scene} and {actual} have different holes: they are not one patient")
     tree_file = find(tree, "trees")
-    needs_plan = any(
-        spec.kind == "UsePreoperativePlan" for _, spec in read_tree(tree_file).root.walk()
-    )
     console = Console(soft_wrap=True, highlight=False)
-    preparation = prepared(believed, world, needs_plan, console)
-    if preparation.plan is not None:
-        console.print(plan_text(preparation.plan, reasons=True), markup=False)
+    prepared = rehearsed(
+        believed.for_bullet() if world == "bullet" else believed,
+        console,
+        with_plan=needs_plan(read_tree(tree_file)),
+        plan_file=plan,
+    )
+    if prepared.result is not None:
+        tell(prepared.result, console)
     operation = Operation(
         scene=believed,
         actual=truth,
@@ -69,8 +73,8 @@ def run(
         world=world,
         tree_file=tree_file,
         seed=seed,
-        force_threshold_n=preparation.force_threshold_n,
-        preoperative=preparation.plan,
+        force_threshold_n=prepared.force_threshold_n,
+        preoperative=prepared.plan,
         max_time_s=max_time,
     )
     recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console)]

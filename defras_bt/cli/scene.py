@@ -47,13 +47,13 @@ def new(
         except NoScene as error:
             raise UserError(str(error)) from error
     out.mkdir(parents=True, exist_ok=True)
-    believed_file = out / f"{generated.believed.name}.yaml"
-    actual_file = out / f"{generated.actual.name}.yaml"
-    write_scene(generated.believed, believed_file)
-    write_variant(generated.actual, believed_file.name, actual_file)
-    solution = generated.actual_solution
-    console.print(f"{believed_file}: {generated.believed.description}", markup=False)
-    console.print(f"{actual_file}: {generated.actual.description}", markup=False)
+    believed, truth = generated.believed.scene, generated.actual.scene
+    believed_file, actual_file = out / f"{believed.name}.yaml", out / f"{truth.name}.yaml"
+    write_scene(believed, believed_file)
+    write_variant(truth, believed_file.name, actual_file)
+    solution = generated.actual.solution
+    console.print(f"{believed_file}: {believed.description}", markup=False)
+    console.print(f"{actual_file}: {truth.description}", markup=False)
     console.print(
         f"Knowing the truth, {solution.arm.upper()} exposes {solution.best_visibility:.0%} from "
         f"grasp point {solution.point} by {' and '.join(solution.manoeuvres)}.",

@@ -1,0 +1,127 @@
+"""Whole operations in ModelWorld: outcome, determinism, and what is left when something breaks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from defras_bt.executive.executive import ExecutiveFailed
+from defras_bt.executive.operation import Operation, operate
+from defras_bt.recording.bag import BagRecorder, read_bag
+from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
+from defras_bt.recording.summary import SummaryRecorder, read_run_json
+from defras_bt.recording.timeline import TimelineRecorder
+from defras_bt.recording.timeline_digest import timeline_digest
+from defras_sim.resources import resource
+from defras_sim.scene import Attachments, Roi, Scene, Simulation, Tissue
+from defras_sim.worlds.error import WorldError
+from defras_sim.worlds.model_world import ModelWorld
+
+BELIEVED = tuple("........####" if 2 <= row <= 9 else "............" for row in range(12))
+# In truth two more stitches hold the far corner.
+MORE = ("...####.....", "...####.....", *BELIEVED[2:])
+
+
+def scene(rows: tuple[str, ...] = BELIEVED) -> Scene:
+    return Scene(
+        name="slab",
+        tissue=Tissue(elements_xyz=(6, 6, 1)),
+        attachments=Attachments(map=rows),
+        roi=Roi(center_x_m=0.0, center_y_m=0.0),
+        simulation=Simulation(elements_xyz=(7, 7, 1)),
+    )
+
+
+def operation(actual: Scene, tree: str = "fras", **changes: object) -> Operation:
+    plain = Operation(
+        scene=scene(),
+        actual=actual,
+        scene_file="slab.yaml",
+        actual_file=None,
+        world="model",
+        tree_file=resource(f"trees/{tree}.yaml"),
+        seed=3,
+        force_threshold_n=0.4,
+    )
+    return replace(plain, **changes)
+
+
+class KeepEvents:
+    """Keeps the sentences of a run."""
+
+    def __init__(self) -> None:
+        self.kinds: list[str] = []
+        self.sent_speed_m_s: list[float] = []
+
+    def start(self, info: RunInfo) -> None: ...
+
+    def tick(self, record: TickRecord) -> None:
+        self.kinds += [event.kind for event in record.events]
+        speeds = [abs(arm.linear_m_s).max() for arm in record.sent.arms.values()]
+        self.sent_speed_m_s.append(max(speeds, default=0.0))
+
+    def finish(self, summary: RunSummary) -> None: ...
+
+
+def test_the_baseline_exposes_the_region_when_the_belief_is_right() -> None:
+    kept = KeepEvents()
+    summary = operate(operation(scene()), [kept])
+    assert summary.values["outcome"] == "goal"
+    assert summary.values["roi_visibility"] >= 0.8
+    assert summary.values["attachment_updates"] == {"tried": 0, "adopted": 0}
+    assert kept.kinds[-1] == "goal"
+    assert kept.sent_speed_m_s[-1] == 0.0, "the tick that ends a run sends no motion"
+
+
+def test_the_same_seed_gives_the_same_timeline(tmp_path: Path) -> None:
+    """Golden: a whole run that warns and learns, twice, column by column."""
+    digests = []
+    for name in ("one.rrd", "two.rrd"):
+        recorder = TimelineRecorder(tmp_path / name)
+        operate(operation(scene(MORE), "defras", max_time_s=6.0), [recorder])
+        digests.append(timeline_digest(tmp_path / name))
+    assert digests[0] == digests[1]
+
+
+def test_another_seed_gives_another_timeline(tmp_path: Path) -> None:
+    digests = set()
+    for seed in (1, 2):
+        recorder = TimelineRecorder(tmp_path / f"{seed}.rrd")
+        operate(operation(scene(), seed=seed, max_time_s=1.0), [recorder])
+        digests.add(timeline_digest(tmp_path / f"{seed}.rrd"))
+    assert len(digests) == 2
+
+
+def test_hidden_attachments_are_noticed() -> None:
+    kept = KeepEvents()
+    summary = operate(operation(scene(MORE), "defras", max_time_s=30.0), [kept])
+    assert sum(summary.values["warnings"].values()) >= 1
+    assert summary.values["attachment_updates"]["tried"] >= 1
+
+
+def test_what_was_recorded_before_a_failure_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real_step = ModelWorld.step
+
+    def breaks_after_a_second(world: ModelWorld) -> None:
+        if world.observe().time_s > 1.0:
+            raise WorldError("the camera fell off")
+        real_step(world)
+
+    monkeypatch.setattr(ModelWorld, "step", breaks_after_a_second)
+    recorders = [
+        TimelineRecorder(tmp_path / "run.rrd"),
+        BagRecorder(tmp_path / "recording.mcap"),
+        SummaryRecorder(tmp_path / "run.json"),
+    ]
+    kept = KeepEvents()
+    with pytest.raises(ExecutiveFailed, match="the camera fell off"):
+        operate(operation(scene()), [*recorders, kept])
+    assert kept.kinds[-1] == "error"
+    assert kept.sent_speed_m_s[-1] == 0.0
+    assert read_run_json(tmp_path / "run.json").outcome == "error"
+    assert timeline_digest(tmp_path / "run.rrd")
+    assert read_bag(tmp_path / "recording.mcap")
