@@ -6,47 +6,26 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import RIGID_HOLE_N_PER_M, ElementName, MaterialName, Scene
 from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.equilibrium import PotentialEnergy
+from defras_sim.tissue.grasp import Grasp, NothingToGrasp, grasped_disc, nearest_on_upper_face
 from defras_sim.tissue.hole_response import HoleResponse
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import Integers, slab_mesh
-from defras_sim.tissue.solver import NewtonSettings, NewtonSolver
-from defras_sim.tissue.springs import (
-    ROW_SHIFTS,
-    ROWS,
-    Springs,
-    disc_rows,
-    joined,
-    net_force,
-    net_moment,
-)
+from defras_sim.tissue.path import Trail, between, length_m, markers_m
+from defras_sim.tissue.solver import NewtonSettings, NewtonSolver, Solution
+from defras_sim.tissue.springs import ROWS, Springs, disc_rows, joined, net_force, net_moment
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.surface import surface_map
 
-# Stiff enough that a patch under 1 N gives 0.1 mm, soft enough not to spoil the conditioning.
-GRASP_N_PER_M = 1e4
-GRASP_REACH_M = 0.008
+__all__ = ["NothingToGrasp", "TissueModel", "TissueSnapshot"]
+
 # Of the tip between two equilibria on the way to a far one; and of Newton's method on that way.
 MAX_TIP_STEP_M = 0.004
 MAX_ITERATIONS = 200
-
-
-@dataclass(frozen=True)
-class Grasp:
-    """A held patch: its springs, and their targets (3, 3) as seen from the tip."""
-
-    springs: Springs
-    tip_targets_m: Floats
-    tissue_from_tip: Pose
-
-    def targets_m(self) -> Floats:
-        pose = self.tissue_from_tip
-        return self.tip_targets_m @ pose.rotation.T + ROW_SHIFTS[:, None] * pose.position_m
 
 
 @dataclass(frozen=True)
@@ -55,10 +34,6 @@ class TissueSnapshot:
 
     positions_m: Floats
     grasps: Mapping[str, Grasp]
-
-
-class NothingToGrasp(ValueError):
-    """The jaw closed where there is no tissue."""
 
 
 class TissueModel:
@@ -71,7 +46,7 @@ class TissueModel:
         element: ElementName | None = None,
         elements_xyz: tuple[int, int, int] | None = None,
         material: MaterialName | None = None,
-        residual_share: float = 1e-6,
+        residual_share: float = 5e-6,
     ) -> None:
         tissue = scene.tissue
         self.scene = scene
@@ -89,6 +64,7 @@ class TissueModel:
         self._hole_stiffness = np.where(scene.attached, RIGID_HOLE_N_PER_M, 0.0)
         self._positions_m = self.mesh.nodes_m.copy()
         self._grasps: dict[str, Grasp] = {}
+        self._trail = Trail()
         self._energy = self._assembled()
         self._solver = NewtonSolver(NewtonSettings(residual_share * self._energy.force_scale_n()))
 
@@ -112,7 +88,7 @@ class TissueModel:
         if not np.all(np.isfinite(stiffness) & (stiffness >= 0)):
             raise ValueError("hole stiffness should be finite and at least 0 N/m")
         self._hole_stiffness = stiffness
-        self._energy = self._assembled()
+        self._changed()
 
     @property
     def grasped_arms(self) -> tuple[str, ...]:
@@ -127,16 +103,15 @@ class TissueModel:
         """
         if arm in self._grasps:
             raise ValueError(f"{arm} holds tissue already; release it first")
-        center = self._nearest_upper_point(tissue_from_tip.position_m)
+        surface = self._surface.surface(self._positions_m)
+        center = nearest_on_upper_face(
+            self.mesh, self._positions_m, surface, tissue_from_tip.position_m
+        )
         radius = self.scene.grasp.patch_radius_m
-        half = np.array([self.scene.tissue.length_x_m, self.scene.tissue.width_y_m]) / 2
-        center = np.clip(center, radius - half, half - radius)
-        rows = disc_rows(self.mesh, center[None], radius, 0.0)
-        springs = Springs(rows, np.full(ROWS, GRASP_N_PER_M))
-        shifted = rows @ self._positions_m - ROW_SHIFTS[:, None] * tissue_from_tip.position_m
-        held = shifted @ tissue_from_tip.rotation
-        self._grasps[arm] = Grasp(springs, held, tissue_from_tip)
-        self._energy = self._assembled()
+        self._grasps[arm] = grasped_disc(
+            self.mesh, self._positions_m, center, radius, tissue_from_tip
+        )
+        self._changed()
 
     def release(self, arm: str) -> None:
         """Let go. Without any grasp nothing loads the tissue, and it returns to rest.
@@ -150,7 +125,7 @@ class TissueModel:
         if not self._grasps:
             self._positions_m = self.mesh.nodes_m.copy()
         self._solver.forget()
-        self._energy = self._assembled()
+        self._changed()
 
     def reset(self) -> None:
         """Rest shape, nothing grasped."""
@@ -164,7 +139,7 @@ class TissueModel:
         self._positions_m = snapshot.positions_m.copy()
         self._grasps = dict(snapshot.grasps)
         self._solver.forget()
-        self._energy = self._assembled()
+        self._changed()
 
     def solve(self, tips: Mapping[str, Pose]) -> TissueState:
         """Equilibrium with each holding arm's tip at its pose in ``tips`` (tissue_from_tip).
@@ -176,35 +151,21 @@ class TissueModel:
             ValueError: a holding arm has no pose, a pose is not finite, or an arm holds nothing.
         """
         self._check(tips)
-        starts = {arm: grasp.tissue_from_tip for arm, grasp in self._grasps.items()}
-        share, iterations, converged = 0.0, 0, True
-        longest = max([_distance(starts[arm], tips[arm]) for arm in starts], default=0.0)
-        step = 1.0 / max(1.0, np.ceil(longest / MAX_TIP_STEP_M))
+        starts = self._tips()
+        share, iterations, converged = 0.0, 0, False
+        step = 1.0 / max(1.0, np.ceil(length_m(starts, tips) / MAX_TIP_STEP_M))
         smallest = step / 32
-        while True:
+        while not converged and step >= smallest and iterations <= MAX_ITERATIONS:
             aim = min(1.0, share + step)
-            before = self._positions_m, dict(self._grasps)
-            for arm, start in starts.items():
-                self._move_tip(arm, _between(start, tips[arm], aim))
-            self._energy.targets_m = self._targets_m()
-            solution = self._solver.minimise(self._energy, self._positions_m)
+            solution = self._step_to(
+                {arm: between(start, tips[arm], aim) for arm, start in starts.items()}
+            )
             iterations += solution.iterations
             if solution.converged:
-                self._positions_m = solution.positions_m
-                share, step = aim, step * 1.5
-                if share >= 1.0:
-                    break
-                if iterations <= MAX_ITERATIONS:
-                    continue
-                converged = False
-                break
-            self._positions_m, self._grasps = before
-            self._solver.forget()
-            step *= 0.5
-            if step < smallest or iterations > MAX_ITERATIONS:
-                converged = False
-                break
-        self._energy.targets_m = self._targets_m()
+                share, step = aim, 1.5 * step
+                converged = share >= 1.0
+            else:
+                step *= 0.5
         return self._state(converged, iterations)
 
     def surface_sensitivity_to_holes(self, holes: Integers) -> Floats:
@@ -240,32 +201,43 @@ class TissueModel:
             stretch,
         )
 
+    def _changed(self) -> None:
+        """What holds the tissue is different from now on."""
+        self._trail.clear()
+        self._energy = self._assembled()
+
     def _assembled(self) -> PotentialEnergy:
         springs = [Springs(self._hole_rows, np.repeat(self._hole_stiffness, ROWS))]
         springs += [grasp.springs for grasp in self._grasps.values()]
         return PotentialEnergy(self._body, joined(springs), self._targets_m())
 
     def _targets_m(self) -> Floats:
-        held = [grasp.targets_m() for grasp in self._grasps.values()]
+        held = [grasp.targets_m for grasp in self._grasps.values()]
         return np.concatenate([self._hole_targets_m, *held])
 
-    def _move_tip(self, arm: str, tissue_from_tip: Pose) -> None:
-        self._grasps[arm] = replace(self._grasps[arm], tissue_from_tip=tissue_from_tip)
+    def _tips(self) -> dict[str, Pose]:
+        return {arm: grasp.tissue_from_tip for arm, grasp in self._grasps.items()}
 
-    def _nearest_upper_point(self, tip_m: Floats) -> Floats:
-        """Rest position (2,) of the point of the upper face that is now nearest to the tip."""
-        surface = self._surface.surface(self._positions_m)
-        vertices = surface.vertices_m[surface.upper]
-        distances = np.linalg.norm(vertices - tip_m, axis=1)
-        nearest = int(np.argmin(distances))
-        rest = surface.rest_xy_m[surface.upper]
-        best, gap = _refine(self, rest[nearest], tip_m)
-        if gap > GRASP_REACH_M:
-            raise NothingToGrasp(
-                f"the tip at {np.round(tip_m, 4)} m is {1e3 * gap:.1f} mm from the tissue's upper "
-                f"face; a grasp needs at most {1e3 * GRASP_REACH_M:.0f} mm"
-            )
-        return best
+    def _step_to(self, tips: Mapping[str, Pose]) -> Solution:
+        """Take the tissue to the equilibrium at ``tips``, or leave it as it was."""
+        before = self._grasps
+        self._grasps = {
+            arm: replace(grasp, tissue_from_tip=tips[arm]) for arm, grasp in before.items()
+        }
+        self._energy.targets_m = self._targets_m()
+        markers = markers_m(tips)
+        starts = [self._positions_m, *self._trail.guesses(markers)]
+        energies = [self._energy.energy_and_gradient(start)[0] for start in starts]
+        solution = self._solver.minimise(self._energy, starts[int(np.argmin(energies))])
+        if solution.converged:
+            self._positions_m = solution.positions_m
+            self._trail.add(markers, solution.positions_m)
+        else:
+            self._grasps = before
+            self._energy.targets_m = self._targets_m()
+            self._solver.forget()
+            self._trail.clear()
+        return solution
 
     def _check(self, tips: Mapping[str, Pose]) -> None:
         if set(tips) != set(self._grasps):
@@ -301,36 +273,3 @@ class TissueModel:
             converged=converged,
             iterations=iterations,
         )
-
-
-def _refine(model: TissueModel, rest_xy_m: Floats, tip_m: Floats) -> tuple[Floats, float]:
-    """Search around a surface vertex for the material point nearest to the tip."""
-    half = np.array([model.scene.tissue.length_x_m, model.scene.tissue.width_y_m]) / 2
-    best = rest_xy_m
-    gap = np.inf
-    width = 0.004
-    for _ in range(8):
-        line = np.linspace(-width, width, 5)
-        around = best + np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
-        around = np.clip(around, -half, half)
-        points = np.column_stack([around, np.zeros(len(around))])
-        positions = model.mesh.interpolation(points) @ model._positions_m
-        distances = np.linalg.norm(positions - tip_m, axis=1)
-        nearest = int(np.argmin(distances))
-        best, gap = around[nearest], float(distances[nearest])
-        width *= 0.5
-    return best, gap
-
-
-def _distance(start: Pose, end: Pose) -> float:
-    """Length of a tip's way [m]; a turn counts as the way of a point 20 mm off."""
-    turn = Rotation.from_matrix(end.rotation @ start.rotation.T).magnitude()
-    return float(np.linalg.norm(end.position_m - start.position_m)) + 0.02 * float(turn)
-
-
-def _between(start: Pose, end: Pose, share: float) -> Pose:
-    if share >= 1.0:
-        return end
-    turn = Rotation.from_matrix(end.rotation @ start.rotation.T).as_rotvec()
-    rotation = Rotation.from_rotvec(share * turn).as_matrix() @ start.rotation
-    return Pose(start.position_m + share * (end.position_m - start.position_m), rotation)
