@@ -43,6 +43,11 @@ def percent(share: float) -> str:
     return f"{100 * share:.0f} %"
 
 
+def times(count: int) -> str:
+    """``never``, ``once``, ``twice``, ``3 times``."""
+    return ("never", "once", "twice")[count] if count < 3 else f"{count} times"
+
+
 def newton(force_n: float | None) -> str:
     return "unknown" if force_n is None or math.isnan(force_n) else f"{force_n:.2f} N"
 

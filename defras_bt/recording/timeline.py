@@ -20,7 +20,7 @@ from defras_bt.recording.shapes import vertex_normals
 from defras_bt.recording.story import outcome_sentence, plan_markdown
 from defras_bt.recording.timeline_blueprint import APPLICATION, default_blueprint
 from defras_bt.recording.timeline_scene import log_believed, log_scene
-from defras_bt.recording.tree_layout import parent_of, tree_layout
+from defras_bt.recording.tree_layout import parent_of, tree_layout, tree_order
 from defras_sim.geometry import Floats
 from defras_sim.scene import ArmName, Vector
 from defras_sim.surface import Surface
@@ -200,7 +200,7 @@ class TimelineRecorder:
 
     def _log_tree(self, status: Mapping[str, str]) -> None:
         paths = list(self._kinds)
-        places = tree_layout(sorted(paths, key=lambda path: _rank(path, paths)))
+        places = tree_layout(tree_order(paths))
         edges = [(p, path) for path in paths if (p := parent_of(path)) is not None]
         self._log(
             "tree/graph",
@@ -324,13 +324,6 @@ def _layout(info: RunInfo, *, pictures: bool) -> rrb.Blueprint:
 
 def _lane_of(path: str) -> list[str]:
     return ["executive", *path.split("/")]
-
-
-def _rank(path: str, paths: list[str]) -> tuple[int, ...]:
-    """Order in which parents come before children and siblings keep their order."""
-    parts = path.split("/")
-    ancestors = ("/".join(parts[: i + 1]) for i in range(len(parts)))
-    return tuple(paths.index(part) if part in paths else -1 for part in ancestors)
 
 
 def _rgba(colours: object) -> NDArray[np.uint32]:

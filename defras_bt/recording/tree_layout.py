@@ -12,6 +12,17 @@ def parent_of(path: str) -> str | None:
     return path.rpartition("/")[0] or None
 
 
+def tree_order(paths: Sequence[str]) -> list[str]:
+    """Parents before children, siblings in the order given, children of one node together."""
+    position = {path: index for index, path in enumerate(paths)}
+
+    def rank(path: str) -> tuple[int, ...]:
+        parts = path.split("/")
+        return tuple(position.get("/".join(parts[: i + 1]), -1) for i in range(len(parts)))
+
+    return sorted(paths, key=rank)
+
+
 def tree_layout(
     paths: Sequence[str], row_px: float = 90.0, column_px: float = 46.0
 ) -> dict[str, Place]:

@@ -6,7 +6,9 @@ import sys
 import time
 from pathlib import Path
 
+from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.composite import CompositeRecorder
+from defras_bt.recording.report import ReportRecorder
 from defras_bt.recording.summary import SummaryRecorder
 from defras_bt.recording.timeline import TimelineRecorder
 from tests.recording.synthetic_run import SyntheticRun
@@ -16,7 +18,14 @@ def main(out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     run = SyntheticRun()
     numbers = SummaryRecorder(out / "run.json")
-    recorder = CompositeRecorder([numbers, TimelineRecorder(out / "run.rrd")])
+    recorder = CompositeRecorder(
+        [
+            numbers,
+            TimelineRecorder(out / "run.rrd"),
+            BagRecorder(out / "recording.mcap"),
+            ReportRecorder(out / "report.html"),
+        ]
+    )
     recorder.start(run.info)
     spent_s = 0.0
     for record in run.ticks():

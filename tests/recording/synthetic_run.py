@@ -376,7 +376,7 @@ _STORY = (
     Event(0.0, "start", "info", "The operation starts with a pre-operative plan."),
     Event(0.2, "plan", "info", "The plan has 5 actions and grasps point (1,4)."),
     *(
-        Event(at, "action", "info", f"{action.arm} begins to {action.name}.")
+        Event(at, "action", "info", f"{action.arm.upper()} begins to {action.name}.")
         for at, action in zip(FIRST_TIMES[:4], FIRST_PLAN, strict=False)
     ),
     Event(4.6, "warning", "warning", "The simulation is 2.1 mm off: the motion goes at half rate."),
@@ -399,7 +399,7 @@ _STORY = (
     Event(6.2, "replan", "info", "A new plan is asked for from what is now believed."),
     Event(6.2, "plan", "info", "The new plan has 5 actions and grasps point (1,2)."),
     *(
-        Event(at, "action", "info", f"{action.arm} begins to {action.name}.")
+        Event(at, "action", "info", f"{action.arm.upper()} begins to {action.name}.")
         for at, action in zip(SECOND_TIMES, SECOND_PLAN, strict=True)
     ),
     Event(15.6, "goal", "info", "94 % of the region is visible: the goal is reached."),
