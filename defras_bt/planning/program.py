@@ -10,6 +10,9 @@ from clingo import Control, Function, Model, Number, Symbol
 
 PROGRAMS = ("asp/retraction.lp", "asp/grasp_choice.lp", "asp/explain.lp")
 
+# Of the weak constraints in asp/grasp_choice.lp, the most important first.
+PRIORITIES = (5, 4, 3, 2, 1)
+
 # Each try is a solve of its own; beyond this an explanation of a huge grid would take minutes.
 MAX_DELETIONS = 60
 
@@ -20,7 +23,7 @@ class PlanningTimeout(Exception):
 
 @dataclass(frozen=True)
 class Answer:
-    """The best answer set at a horizon: what it shows, and its cost from the highest priority."""
+    """The best answer set at a horizon: what it shows, and its cost per priority (5 to 1)."""
 
     shown: tuple[Symbol, ...]
     cost: tuple[int, ...]
@@ -73,7 +76,9 @@ class RetractionProgram:
         answers: list[Answer] = []
 
         def keep(model: Model) -> None:
-            answers[:] = [Answer(tuple(model.symbols(shown=True)), tuple(model.cost))]
+            by_priority = dict(zip(model.priority, model.cost, strict=True))
+            cost = tuple(by_priority.get(priority, 0) for priority in PRIORITIES)
+            answers[:] = [Answer(tuple(model.symbols(shown=True)), cost)]
 
         with self._control.solve(on_model=keep, async_=True) as handle:
             if not handle.wait(budget_s):

@@ -1,0 +1,162 @@
+"""Selection rule, force threshold, and the plan made before the operation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from defras_bt.planning.plan_file import InvalidPlanFile, StalePlanFile, load_plan, save_plan
+from defras_bt.planning.preoperative import (
+    Execution,
+    choose,
+    force_threshold_over,
+    median_force_n,
+    preoperative_plan,
+)
+from defras_bt.planning.scene_hash import scene_hash
+from tests.planning.conftest import make_scene
+
+STEP_M = 0.01
+
+
+def execution(point, manoeuvres, visibility, force_max_n):
+    return Execution(point, tuple(manoeuvres.split()), visibility, force_max_n, True)
+
+
+SHORT = execution((1, 1), "pull", 0.9, 0.25)
+GENTLE = execution((2, 1), "pull move fold", 1.0, 0.10)
+MEDIUM = execution((3, 1), "pull fold", 0.8, 0.20)
+FOURTH = execution((4, 1), "pull", 1.0, 0.26)
+BLIND = execution((5, 1), "pull", 0.79, 0.01)
+ROUGH = execution((1, 2), "pull", 1.0, 0.31)
+
+
+@pytest.mark.parametrize(
+    ("executions", "best"),
+    [
+        ([GENTLE, MEDIUM, SHORT, FOURTH, BLIND, ROUGH], SHORT),  # shortest of the three gentlest
+        ([GENTLE, MEDIUM, FOURTH], FOURTH),
+        ([GENTLE, MEDIUM, BLIND], MEDIUM),
+        ([SHORT, FOURTH], SHORT),  # as short, gentler
+        ([BLIND, ROUGH], None),
+        ([], None),
+    ],
+)
+def test_choice(executions, best):
+    assert choose(executions, visibility=0.8, limit_n=0.3) == best
+    assert choose(executions[::-1], visibility=0.8, limit_n=0.3) == best
+
+
+def test_median_of_the_largest_forces():
+    assert median_force_n([SHORT, GENTLE, ROUGH]) == 0.25
+    with pytest.raises(ValueError, match="no retraction was rehearsed"):
+        median_force_n([])
+
+
+@pytest.fixture(scope="module")
+def small():
+    """Two grasp points on a coarse tissue."""
+    return make_scene(2, 1, 0.01, tissue={"elements_xyz": (4, 4, 1)})
+
+
+@pytest.fixture(scope="module")
+def rehearsed(small):
+    ticks = []
+    result = preoperative_plan(
+        small, jobs=1, step_m=STEP_M, progress=lambda *tick: ticks.append(tick)
+    )
+    return result, ticks
+
+
+def test_executions_threshold_and_progress(small, rehearsed):
+    result, ticks = rehearsed
+    assert ticks == [(1, 2), (2, 2)]
+    assert {e.point for e in result.executions} == {(1, 1), (2, 1)}
+    keys = [(e.point, e.manoeuvres) for e in result.executions]
+    assert len(keys) == len(set(keys)) <= 8
+    forces_n = [e.force_max_n for e in result.executions]
+    assert result.force_median_n == np.median(forces_n)
+    assert result.force_threshold_n == 2 * result.force_median_n
+
+
+def test_the_plan_follows_the_choice(small, rehearsed):
+    result, _ = rehearsed
+    chosen = choose(result.executions, 0.8, result.force_threshold_n)
+    assert result.chosen == chosen
+    names = [action.name for action in result.plan.actions]
+    if chosen is None:
+        assert result.plan.source == "asp"
+        assert "grasp-point optimisation prefers" in result.reason
+    else:
+        assert result.plan.source == "preoperative"
+        assert names[3:] == list(chosen.manoeuvres)
+        assert result.plan.actions[0].point == chosen.point
+
+
+def with_thresholds(scene, **changes):
+    return scene.model_copy(update={"thresholds": scene.thresholds.model_copy(update=changes)})
+
+
+def test_threshold_of_the_scene_counts_and_nothing_qualifies(small):
+    strict = with_thresholds(small, force_n=1e-6)
+    result = preoperative_plan(strict, jobs=1, step_m=STEP_M)
+    assert result.force_threshold_n == 1e-6
+    assert result.chosen is None
+    assert result.plan.source == "asp"
+    assert result.plan.proved_shortest
+    assert result.reason.endswith("the plan is the one that the grasp-point optimisation prefers")
+
+
+def test_jobs_change_nothing_and_scenes_pool(small, rehearsed):
+    ticks = []
+    threshold_n = force_threshold_over(
+        [small, small], jobs=2, step_m=STEP_M, progress=lambda *tick: ticks.append(tick)
+    )
+    assert ticks == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert threshold_n == pytest.approx(rehearsed[0].force_threshold_n, rel=1e-9)
+
+
+def test_plan_file_round_trip(small, rehearsed, tmp_path):
+    file = tmp_path / "plan.json"
+    save_plan(rehearsed[0], file)
+    assert load_plan(file, small) == rehearsed[0]
+    renamed = small.model_copy(update={"name": "other", "description": "same content"})
+    assert load_plan(file, renamed) == rehearsed[0]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"force_n": 0.3},
+        {"roi_visibility": 0.7},
+    ],
+)
+def test_stale_plan_file(small, rehearsed, tmp_path, changes):
+    file = tmp_path / "plan.json"
+    save_plan(rehearsed[0], file)
+    with pytest.raises(StalePlanFile, match="plan again"):
+        load_plan(file, with_thresholds(small, **changes))
+
+
+def test_hash_sees_attachments_but_not_sensors(small):
+    moved = small.with_attached(~small.attached)
+    noisy = small.model_copy(
+        update={"depth_camera": small.depth_camera.model_copy(update={"noise_sd_m": 0.01})}
+    )
+    assert scene_hash(moved) != scene_hash(small)
+    assert scene_hash(noisy) == scene_hash(small)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("{", "the file: Invalid JSON"),
+        ('{"schema": "defras/preoperative/2", "result": {}}', "schema: Input should be"),
+        ('{"schema": "defras/preoperative/1", "result": {}}', "result.scene: Field required"),
+    ],
+)
+def test_invalid_plan_file(small, tmp_path, content, message):
+    file = tmp_path / "plan.json"
+    file.write_text(content)
+    with pytest.raises(InvalidPlanFile, match=message):
+        load_plan(file, small)
