@@ -37,16 +37,25 @@ class GripUnsafe(Node):
                 "force", f"the force has been too high or unknown for {over_s:.2f} s"
             )
         state = board.warning_state
-        if state is not None and state >= 2 and board.unexplained:
+        if state is not None and state >= 2 and (board.unexplained or self._learned_in_vain()):
             return self.succeed(
                 "unexplained", f"warning state {state}, and the attachments do not explain it"
             )
         return self.fail("safe", "the grip is safe")
 
+    def _learned_in_vain(self) -> bool:
+        """Learning stopped for just this and was believed, and the mismatch came back at once."""
+        board = self.context.board
+        last = board.last_learning
+        return last is not None and last.warning_state >= 2 and last.tick < board.inputs.tick
+
 
 @register_node
 class LetGo(Node):
-    """Open the jaws that hold tissue, without moving a tip, and block their grasp points."""
+    """Open the jaws that hold tissue, without moving a tip, and block their grasp points.
+
+    A jaw that does not open ends the run with a call for a human.
+    """
 
     role: ClassVar[Role] = "recovery"
 
@@ -68,5 +77,14 @@ class LetGo(Node):
                 )
             board.move(arm, ArmCommand(jaw_rad=JAW_OPEN_RAD))
         if board.inputs.time_s - self._started_s > JAW_TIME_OUT_S:
-            return self.fail("time_out", f"a jaw did not open within {JAW_TIME_OUT_S:g} s")
+            return self._stuck()
         return self.run("opening", "letting go of the tissue")
+
+    def _stuck(self) -> Status:
+        """Tissue that must be let go and cannot be: only a human can help."""
+        board = self.context.board
+        arms = " and ".join(arm.upper() for arm in board.grips)
+        why = f"{arms} should let go of the tissue but did not open within {JAW_TIME_OUT_S:g} s"
+        board.tell("human", f"Motion stopped, a human is asked to take over: {why}.", "error")
+        board.end("human", why)
+        return self.fail("time_out", why)

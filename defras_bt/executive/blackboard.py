@@ -51,6 +51,7 @@ class Grip:
 class LearningAttempt:
     """When attachments were last learned: the warning state and the tips (3,) per arm then."""
 
+    tick: int
     warning_state: int
     tips_m: Mapping[str, Floats]
 

@@ -110,7 +110,7 @@ class AskHuman(Task):
             return board.inputs.operator_stop or str(board.operator_refused)
         if board.inputs.missing:
             return "; ".join(board.inputs.missing)
-        if (board.warning_state or 0) >= 3:
+        if (board.warning_state or 0) >= 2:
             return f"the tissue is {board.mu_m * 1e3:.1f} mm away from where the model expects it"
         return "no safe way to go on was found"
 

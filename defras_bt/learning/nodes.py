@@ -21,9 +21,11 @@ class LearnAttachments(Node):
         board, context = self.context.board, self.context
         frames = context.keyframes.frames()
         if not frames:
+            board.unexplained = True
             return self.fail("no_data", "no shape was seen since the grasp")
         arms = board.inputs.observation.arms
         board.last_learning = LearningAttempt(
+            tick=board.inputs.tick,
             warning_state=board.warning_state or 0,
             tips_m={name: arm.tissue_from_tip.position_m for name, arm in arms.items()},
         )

@@ -32,13 +32,17 @@ def flat_state(converged: bool = True) -> TissueState:
 
 
 class BenchTwin:
-    """Believes ``scene`` and feels ``force_n``; ``broken`` is raised when it should track."""
+    """Believes ``scene``; a grip feels ``feels_n``. ``broken`` is raised when it should track."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.force_n = 0.0
+        self.feels_n = 0.0
         self.broken: Exception | None = None
         self.holding: set[str] = set()
+
+    @property
+    def force_n(self) -> float:
+        return self.feels_n if self.holding else 0.0
 
     def grasp(self, arm: str, tissue_from_tip: Pose) -> None:
         self.holding.add(arm)

@@ -26,10 +26,11 @@ def test_reasons(bench, says, expected):
     assert bench.board.events[-1].level == "error"
 
 
-def test_a_lost_model_is_told_in_millimetres(bench):
-    bench.warn(3)
+@pytest.mark.parametrize(("state", "expected"), [(1, "no safe way"), (2, "5.0 mm"), (3, "7.0 mm")])
+def test_a_lost_model_is_told_in_millimetres(bench, state, expected):
+    bench.warn(state)
     bench.tick(bench.node(AskHuman))
-    assert "7.0 mm away" in bench.board.outcome_reason
+    assert expected in bench.board.outcome_reason
 
 
 def test_a_refused_plan_is_a_reason(bench):

@@ -5,6 +5,7 @@ from py_trees.common import Status
 from pydantic import ValidationError
 
 from defras_bt.acting.let_go import GripUnsafe
+from defras_bt.executive.blackboard import LearningAttempt
 
 
 def says(bench, **parameters):
@@ -52,6 +53,19 @@ def test_a_mismatch_that_learning_could_not_explain(bench, state, unexplained, e
     bench.hold()
     bench.warn(state)
     bench.board.unexplained = unexplained
+    assert says(bench)[1] == expected
+
+
+@pytest.mark.parametrize(
+    ("learned_in", "ticks_ago", "expected"),
+    [(2, 0, "safe"), (2, 1, "unexplained"), (1, 1, "safe")],
+)
+def test_a_mismatch_that_came_back_after_learning(bench, learned_in, ticks_ago, expected):
+    """Learning gets its chance in the tick in which it ran; nothing new was seen since."""
+    bench.hold()
+    bench.warn(2)
+    bench.world.ticks = 100
+    bench.board.last_learning = LearningAttempt(100 - ticks_ago, learned_in, {})
     assert says(bench)[1] == expected
 
 

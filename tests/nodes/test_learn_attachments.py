@@ -50,7 +50,7 @@ def test_the_attempt_is_remembered_with_state_and_tips(bench, learn, adopts):
     bench.estimator.adopts = adopts
     bench.tick(learn)
     attempt = bench.board.last_learning
-    assert attempt.warning_state == 1
+    assert (attempt.tick, attempt.warning_state) == (0, 1)
     assert set(attempt.tips_m) == {"psm1", "psm2"}
     np.testing.assert_array_equal(attempt.tips_m["psm1"], bench.tip_m())
 
@@ -69,6 +69,7 @@ def test_without_a_shape_nothing_is_tried(bench):
     assert node.code == "no_data"
     assert bench.estimator.asked == []
     assert bench.board.last_learning is None
+    assert bench.board.unexplained
     assert bench.told("learning") == []
 
 

@@ -16,7 +16,7 @@ def due(bench):
 def tried(bench, state):
     """Learning was tried in ``state``, with the tips where they are now."""
     tips_m = {arm: bench.tip_m(arm).copy() for arm in ("psm1", "psm2")}
-    bench.board.last_learning = LearningAttempt(state, tips_m)
+    bench.board.last_learning = LearningAttempt(0, state, tips_m)
 
 
 def test_nothing_is_learned_from_untouched_tissue(bench):

@@ -52,10 +52,13 @@ def test_afterwards_the_arm_counts_as_being_at_no_point(bench):
     assert bench.board.at == {}
 
 
-def test_a_jaw_that_stays_shut_is_reported(bench):
+def test_a_jaw_that_stays_shut_needs_a_human(bench):
     bench.hold((2, 4))
     bench.world.stuck.add("psm1")
     node = bench.node(LetGo)
     assert bench.run(node) == Status.FAILURE
     assert node.code == "time_out"
     assert JAW_TIME_OUT_S < bench.world.time_s < JAW_TIME_OUT_S + 0.2
+    assert bench.board.outcome == "human"
+    assert "PSM1 should let go" in bench.board.outcome_reason
+    assert len(bench.told("human")) == 1
