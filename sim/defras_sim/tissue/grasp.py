@@ -22,11 +22,15 @@ class NothingToGrasp(ValueError):
 
 @dataclass(frozen=True)
 class Grasp:
-    """A held patch: its springs, and their targets (3, 3) as seen from the tip."""
+    """A held patch: its springs, and their targets (3, 3) as seen from the tip.
+
+    ``tissue_from_rest_tip`` is where the tip would hold the patch without deforming the tissue.
+    """
 
     springs: Springs
     tip_targets_m: Floats
     tissue_from_tip: Pose
+    tissue_from_rest_tip: Pose
 
     @property
     def targets_m(self) -> Floats:
@@ -44,9 +48,24 @@ def grasped_disc(
     half = np.ptp(mesh.nodes_m, axis=0)[:2] / 2
     center = np.clip(center_xy_m, radius_m - half, half - radius_m)
     rows = disc_rows(mesh, center[None], radius_m, 0.0)
-    from_tip = rows @ positions_m - ROW_SHIFTS[:, None] * tissue_from_tip.position_m
+    held = rows @ positions_m
+    from_tip = held - ROW_SHIFTS[:, None] * tissue_from_tip.position_m
+    rest_tip = _patch_motion(rows @ mesh.nodes_m, held).inverse() @ tissue_from_tip
     springs = Springs(rows, np.full(ROWS, GRASP_N_PER_M))
-    return Grasp(springs, from_tip @ tissue_from_tip.rotation, tissue_from_tip)
+    return Grasp(springs, from_tip @ tissue_from_tip.rotation, tissue_from_tip, rest_tip)
+
+
+def _patch_motion(rest_m: Floats, now_m: Floats) -> Pose:
+    """Rigid motion nearest to a disc's deformation, from its mean and moments (3, 3)."""
+
+    def frame(held: Floats) -> Floats:
+        x = held[1] / np.linalg.norm(held[1])
+        z = np.cross(x, held[2])
+        z /= np.linalg.norm(z)
+        return np.column_stack([x, np.cross(z, x), z])
+
+    rotation = frame(now_m) @ frame(rest_m).T
+    return Pose(now_m[0] - rotation @ rest_m[0], rotation)
 
 
 def nearest_on_upper_face(

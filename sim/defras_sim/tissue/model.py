@@ -136,36 +136,29 @@ class TissueModel:
 
     def restore(self, snapshot: TissueSnapshot) -> None:
         """Go back to ``snapshot``; the holes keep their present stiffness."""
-        self._positions_m = snapshot.positions_m.copy()
-        self._grasps = dict(snapshot.grasps)
-        self._solver.forget()
+        self._place(snapshot)
         self._changed()
 
     def solve(self, tips: Mapping[str, Pose]) -> TissueState:
         """Equilibrium with each holding arm's tip at its pose in ``tips`` (tissue_from_tip).
 
-        Long ways are gone in steps of some millimetres, halved where a step fails. If that does
-        not help, the state is the last good one on the way, marked as not converged.
+        Long ways are gone in steps of some millimetres, halved where a step fails. Where other
+        holes hold than before, the way may have to start again from rest. If that does not help,
+        the state is the last good one, marked as not converged.
 
         Raises:
             ValueError: a holding arm has no pose, a pose is not finite, or an arm holds nothing.
         """
         self._check(tips)
-        starts = self._tips()
-        share, iterations, converged = 0.0, 0, False
-        step = 1.0 / max(1.0, np.ceil(length_m(starts, tips) / MAX_TIP_STEP_M))
-        smallest = step / 32
-        while not converged and step >= smallest and iterations <= MAX_ITERATIONS:
-            aim = min(1.0, share + step)
-            solution = self._step_to(
-                {arm: between(start, tips[arm], aim) for arm, start in starts.items()}
-            )
-            iterations += solution.iterations
-            if solution.converged:
-                share, step = aim, 1.5 * step
-                converged = share >= 1.0
-            else:
-                step *= 0.5
+        before = self.snapshot()
+        moving = length_m(self._tips(), tips) > 0
+        converged, iterations = self._travel(tips)
+        if not converged and not moving:
+            self._place(TissueSnapshot(self.mesh.nodes_m, _at_rest(self._grasps)))
+            converged, more = self._travel(tips)
+            iterations += more
+            if not converged:
+                self._place(before)
         return self._state(converged, iterations)
 
     def surface_sensitivity_to_holes(self, holes: Integers) -> Floats:
@@ -217,6 +210,32 @@ class TissueModel:
 
     def _tips(self) -> dict[str, Pose]:
         return {arm: grasp.tissue_from_tip for arm, grasp in self._grasps.items()}
+
+    def _place(self, snapshot: TissueSnapshot) -> None:
+        self._positions_m = snapshot.positions_m.copy()
+        self._grasps = dict(snapshot.grasps)
+        self._energy.targets_m = self._targets_m()
+        self._solver.forget()
+        self._trail.clear()
+
+    def _travel(self, tips: Mapping[str, Pose]) -> tuple[bool, int]:
+        """Go to ``tips`` through equilibria; (arrived, iterations). Stops at the last good one."""
+        starts = self._tips()
+        way = length_m(starts, tips)
+        step = 1.0 / max(1.0, np.ceil(way / MAX_TIP_STEP_M))
+        smallest = step / 32 if way > 0 else step
+        share, iterations = 0.0, 0
+        while share < 1.0 and step >= smallest and iterations <= MAX_ITERATIONS:
+            aim = min(1.0, share + step)
+            solution = self._step_to(
+                {arm: between(start, tips[arm], aim) for arm, start in starts.items()}
+            )
+            iterations += solution.iterations
+            if solution.converged:
+                share, step = aim, 1.5 * step
+            else:
+                step *= 0.5
+        return share >= 1.0, iterations
 
     def _step_to(self, tips: Mapping[str, Pose]) -> Solution:
         """Take the tissue to the equilibrium at ``tips``, or leave it as it was."""
@@ -273,3 +292,11 @@ class TissueModel:
             converged=converged,
             iterations=iterations,
         )
+
+
+def _at_rest(grasps: Mapping[str, Grasp]) -> dict[str, Grasp]:
+    """The same grasps where they do not deform the tissue."""
+    return {
+        arm: replace(grasp, tissue_from_tip=grasp.tissue_from_rest_tip)
+        for arm, grasp in grasps.items()
+    }

@@ -176,6 +176,30 @@ def test_softer_holes_give_way():
     )
 
 
+def test_a_hole_that_suddenly_holds_lifted_tissue_is_solved_from_rest():
+    tissue = model()
+    retract(tissue, GRASP, LIFTED)
+    stiffness = tissue.hole_stiffness_n_per_m
+    stiffness[12 * 5 + 7] = RIGID_HOLE_N_PER_M  # now 15 mm below the tissue it shall hold
+    tissue.set_hole_stiffness(stiffness)
+    state = tissue.solve({"psm1": LIFTED})
+    assert state.converged
+    other = model()
+    other.set_hole_stiffness(stiffness)
+    expected = retract(other, GRASP, LIFTED)
+    np.testing.assert_allclose(state.nodes_m, expected.nodes_m, atol=2e-4)
+
+
+def test_a_patch_taken_while_deformed_knows_where_it_rests():
+    tissue = model()
+    retract(tissue, GRASP, LIFTED, FOLDED)
+    surface = tissue.solve({"psm1": FOLDED}).surface
+    taken = Pose(surface.vertices_m[surface.upper][25 * 18 + 10])
+    tissue.grasp("psm2", taken)
+    rest_tip = tissue._grasps["psm2"].tissue_from_rest_tip
+    np.testing.assert_allclose(rest_tip.position_m, [-0.01, 0.03, 0.0], atol=1e-3)
+
+
 def test_sensitivity_to_holes_matches_differences():
     tissue = model(residual_share=1e-10)
     stiffness = np.where(tissue.scene.attached, 60.0, 0.0)
