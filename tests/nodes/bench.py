@@ -17,6 +17,7 @@ from defras_bt.learning.buffer import KeyframeBuffer
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import GridPoint, Plan
 from defras_sim.geometry import Floats, Pose
+from defras_sim.scene import Scene
 from defras_sim.worlds.protocol import ArmCommand
 from tests.nodes.bench_services import (
     MU_M,
@@ -39,9 +40,9 @@ class Bench:
     preoperative: Plan | None = None
     approve: Callable[[Plan], bool] = lambda plan: True
     says: dict[str, Any] = field(default_factory=dict)
+    scene: Scene = field(default_factory=bench_scene)
 
     def __post_init__(self) -> None:
-        self.scene = bench_scene()
         self.world = BenchWorld(self.scene)
         self.twin = BenchTwin(self.scene)
         self.monitor = BenchMonitor()
