@@ -138,7 +138,7 @@ def _tiles(values: Any) -> list[Tile]:
         Tile(
             "Duration",
             f"{values['duration_s']:.1f} s",
-            f"world time; {values['wall_s']:.0f} s of yours",
+            f"world time; {values['wall_s']:.0f} s on the clock",
         ),
     ]
 

@@ -132,11 +132,13 @@ def _discrepancy(axis: Axes, log: RunLog, time_s: Floats) -> None:
         label = f"{metric} (the tree acts on it)" if acts else metric
         axis.plot(time_s, mu_mm, color=css(colour), linewidth=1.7 if acts else 1.1, label=label)
         largest = max(largest, float(np.nanmax(mu_mm, initial=0.0)))
-    for number, (delta_mm, colour) in enumerate(
-        zip(deltas_mm, palette.WARNING_STATES[1:], strict=True), start=1
-    ):
-        _limit(axis, delta_mm, css(colour), f"delta{number}")
-    axis.set_ylim(0, 1.32 * max(largest, deltas_mm[-1]))
+    top_mm = 1.32 * max(largest, deltas_mm[-1])
+    # Three names need room; a curve far above the limits leaves it for one.
+    crowded = deltas_mm[1] - deltas_mm[0] < 0.09 * top_mm
+    names = ("", "delta1-3", "") if crowded else ("delta1", "delta2", "delta3")
+    for name, delta_mm, colour in zip(names, deltas_mm, palette.WARNING_STATES[1:], strict=True):
+        _limit(axis, delta_mm, css(colour), name)
+    axis.set_ylim(0, top_mm)
     axis.set_ylabel("discrepancy\nmu [mm]")
     if log.metrics:
         axis.legend(loc="upper left", ncols=3)

@@ -26,8 +26,9 @@ from defras_sim.scene import ArmName, Vector
 from defras_sim.surface import Surface
 from defras_sim.worlds.protocol import ArmObservation, CameraImage
 
-# A surface is written on every other tick, and only if a vertex has moved this far since.
-_SURFACE_EVERY = 2
+# Surfaces and clouds fill the file: five pictures a second of world time are smooth enough, and a
+# surface is written only if a vertex has moved this far since.
+_SURFACE_EVERY = 4
 _SURFACE_STEP_M = 1e-4
 _JPEG_QUALITY = 80
 # So many ticks share a chunk of the file: each costs a kilobyte of its own.
@@ -159,7 +160,7 @@ class TimelineRecorder:
         """Limits are constant: enough points to draw a line, and one at the end."""
         _, info = self._started()
         deltas_mm = [1000 * delta_m for delta_m in info.scene.thresholds.delta_m]
-        self._log("signals/mu_mm/limits", rr.Scalars(deltas_mm))
+        self._log("signals/mu_mm/thresholds", rr.Scalars(deltas_mm))
         self._log("signals/force_n/epsilon", rr.Scalars(info.force_threshold_n))
 
     # Lanes and tree --------------------------------------------------------------------------
@@ -221,13 +222,15 @@ class TimelineRecorder:
 
     def _log_tissue(self, record: TickRecord, info: RunInfo) -> None:
         if record.twin is not None:
-            twin = (*palette.TWIN, 80)
+            twin = (*palette.TWIN, 64)
             self._log_surface("simulated", record.twin.surface, twin, record.tick)
         if record.true_surface is not None:
             tissue = (*palette.TISSUE, 255)
             self._log_surface("actual", record.true_surface, tissue, record.tick)
         cloud = record.observation.cloud
-        if cloud is None or not self._changed("cloud", cloud.stamp_s):
+        if cloud is None or record.tick % _SURFACE_EVERY:
+            return
+        if not self._changed("cloud", cloud.stamp_s):
             return
         colours: NDArray[np.uint8] | palette.Rgb = palette.MUTED
         if record.reading is not None and len(record.reading.per_point_m) == len(cloud.points_m):
@@ -298,7 +301,7 @@ _SERIES: dict[str, tuple[tuple[str, ...], tuple[palette.Rgb, ...], float]] = {
     "force_n/epsilon": (("epsilon",), (palette.WARNING_STATES[3],), 1.0),
     "mu_mm/local": (("local",), (palette.ESTIMATED,), 2.0),
     "mu_mm/median": (("median",), (palette.MEDIAN,), 2.0),
-    "mu_mm/limits": (("delta1", "delta2", "delta3"), palette.WARNING_STATES[1:], 1.0),
+    "mu_mm/thresholds": (("delta1", "delta2", "delta3"), palette.WARNING_STATES[1:], 1.0),
     "rate": (("rate",), (palette.ARMS["psm1"],), 2.0),
     "visibility": (("visibility",), (palette.ROI,), 2.0),
 }
