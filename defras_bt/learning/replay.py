@@ -1,0 +1,113 @@
+"""The observed motion, repeated on a tissue model with other attachments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defras_bt.learning.estimate import Keyframe
+from defras_sim.geometry import Floats, Pose
+from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene
+from defras_sim.tissue.hole_response import HoleResponse
+from defras_sim.tissue.model import NothingToGrasp, TissueModel, TissueSnapshot
+from defras_sim.tissue.state import TissueState
+
+
+def hole_stiffness_n_per_m(attached: NDArray[np.bool_]) -> Floats:
+    """Stiffness (holes,) of holes that hold or are free."""
+    return np.where(attached, RIGID_HOLE_N_PER_M, 0.0)
+
+
+class NotRepeatable(RuntimeError):
+    """The model cannot follow the observed motion."""
+
+
+class Replay:
+    """Shapes of a tissue model at the keyframes, for any stiffness of the holes.
+
+    The motion is repeated in order from the resting tissue once, by :meth:`repeat`, so that each
+    frame lies on the branch of equilibria that the motion leads to. :meth:`shapes` then changes
+    the holes under each frame as it stands, which costs one solve a frame.
+    """
+
+    def __init__(
+        self,
+        belief: Scene,
+        keyframes: Sequence[Keyframe],
+        elements_xyz: tuple[int, int, int] | None = None,
+    ) -> None:
+        self._keyframes = tuple(keyframes)
+        self.model = TissueModel(belief, elements_xyz=elements_xyz)
+        self._snapshots: list[TissueSnapshot] = []
+
+    def repeat(self, stiffness_n_per_m: Floats) -> list[TissueState]:
+        """Repeat the whole motion from rest; later changes start from here.
+
+        Raises:
+            NotRepeatable: a grasp misses the tissue, or a solve fails.
+        """
+        model = self.model
+        model.reset()
+        model.set_hole_stiffness(stiffness_n_per_m)
+        self._grasp_all(self._keyframes[0])
+        states, self._snapshots = [], []
+        for number, frame in enumerate(self._keyframes, 1):
+            state = model.solve(frame.tips)
+            if not state.converged:
+                raise NotRepeatable(
+                    f"the model finds no equilibrium on the way to frame {number} "
+                    f"of {len(self._keyframes)}"
+                )
+            states.append(state)
+            self._snapshots.append(model.snapshot())
+        return states
+
+    def shapes(
+        self, stiffness_n_per_m: Floats, frames: Sequence[int], *, keep: bool = False
+    ) -> list[TissueState] | None:
+        """Shapes at ``frames`` with other holes, each led there from its last kept shape.
+
+        None where a solve fails. ``keep`` makes the new shapes the start of later changes.
+        """
+        states = []
+        snapshots = list(self._snapshots)
+        self.model.set_hole_stiffness(stiffness_n_per_m)
+        for frame in frames:
+            self.model.restore(self._snapshots[frame])
+            state = self.model.solve(self._keyframes[frame].tips)
+            if not state.converged:
+                return None
+            states.append(state)
+            snapshots[frame] = self.model.snapshot()
+        if keep:
+            self._snapshots = snapshots
+        return states
+
+    def response(
+        self, frame: int, stiffness_n_per_m: Floats, holes: NDArray[np.int64]
+    ) -> HoleResponse:
+        """How a kept shape, with the holes as they were then, answers to forces at ``holes``."""
+        self.model.set_hole_stiffness(stiffness_n_per_m)
+        self.model.restore(self._snapshots[frame])
+        return self.model.response_to_hole_forces(holes)
+
+    def _grasp_all(self, first: Keyframe) -> None:
+        """Take every grasp; an arm that has moved at the first frame took the tissue earlier."""
+        moved = {
+            arm: float(np.linalg.norm(first.tips[arm].position_m - tip.position_m))
+            for arm, tip in first.grasp_tips.items()
+        }
+        held: dict[str, Pose] = {}
+        for arm in sorted(moved, key=lambda name: -moved[name]):
+            self._go(held)
+            try:
+                self.model.grasp(arm, first.grasp_tips[arm])
+            except NothingToGrasp as miss:
+                raise NotRepeatable(f"the grasp of {arm} cannot be repeated: {miss}") from miss
+            held[arm] = first.tips[arm]
+
+    def _go(self, tips: Mapping[str, Pose]) -> None:
+        if tips and not self.model.solve(tips).converged:
+            raise NotRepeatable("the model finds no equilibrium on the way to the second grasp")

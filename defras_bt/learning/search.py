@@ -1,0 +1,234 @@
+"""Search for the attachments that explain observed shapes.
+
+Rounds of: linearise the tissue at every frame, flip blocks of holes as the linearised tissue
+advises, solve the real model with the result, keep it if its true cost is lower.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defras_bt.learning.linearised import Indices, LinearisedFrame
+from defras_bt.learning.misfit import Misfit, misfit
+from defras_bt.learning.observed_cells import ObservedCells
+from defras_bt.learning.replay import Replay, hole_stiffness_n_per_m
+from defras_sim.geometry import Floats
+from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene
+
+Mask = NDArray[np.bool_]
+
+BLOCKS = ((1, 1), (1, 2), (2, 1), (2, 2), (1, 3), (3, 1), (2, 3), (3, 2), (3, 3))
+"""Shapes of the blocks of holes that are made to hold, or to let go, at once. Single flips alone
+get stuck: letting go one hole of a patch changes next to nothing while its neighbours hold."""
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """What departing from the belief costs, and how long to search.
+
+    A cell's squared error counts in units of ``error_m``, the accuracy of the model rather than
+    of the camera, and grows only linearly beyond ``robust_m``, where the closest point is likely
+    the wrong one. A changed hole has to gain ``change_price`` in those units, and each edge between
+    a changed and an unchanged neighbour ``edge_price``: belief errs in patches.
+    """
+
+    error_m: float = 0.001
+    robust_m: float = 0.004
+    change_price: float = 0.5
+    edge_price: float = 0.25
+    rounds: int = 8
+    flips_per_round: int = 6
+    observable_stretch_m: float = 0.0005
+    observable_force_share: float = 0.02
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """``attached`` (holes,) is the best set found; ``probability`` (holes,) that each one holds,
+    from what flipping it alone would cost."""
+
+    attached: Mask
+    probability: Floats
+    cost_before: float
+    cost_after: float
+    solves: int
+
+
+class AttachmentSearch:
+    """Searches around one belief with the points of ``frames`` that may be fitted."""
+
+    def __init__(
+        self,
+        belief: Scene,
+        replay: Replay,
+        points_m: Sequence[Floats],
+        frames: Sequence[int],
+        settings: SearchSettings,
+    ) -> None:
+        """``points_m`` are the fitted points (n, 3) of each of ``frames``."""
+        self._belief = belief
+        self._replay = replay
+        self._cells = [ObservedCells.of(points) for points in points_m]
+        self._frames = tuple(frames)
+        self._settings = settings
+        self._believed = belief.attached
+        self._grid = np.arange(len(self._believed)).reshape(belief.hole_counts[::-1])
+        self._solves = 0
+
+    def run(self) -> SearchResult:
+        """Search from the belief. A set that the model cannot take is never chosen."""
+        attached = self._believed
+        cost = before = self._true_cost(attached, keep=True)
+        linearised = self._linearise(attached)
+        for _ in range(self._settings.rounds):
+            advised = self._advise(attached, linearised)
+            found: tuple[Mask, float] | None = None
+            while advised and found is None:
+                value = self._true_cost(advised[-1], keep=False)
+                if value < cost - 1e-6:
+                    found = advised[-1], value
+                advised = advised[: len(advised) // 2]
+            if found is None:
+                break
+            attached, cost = found
+            self._true_cost(attached, keep=True)
+            linearised = self._linearise(attached)
+        probability = self._probability(attached, linearised)
+        return SearchResult(attached, probability, before, cost, self._solves)
+
+    def _advise(self, attached: Mask, frames: Sequence[LinearisedFrame]) -> list[Mask]:
+        """Sets along a greedy descent of the linearised cost, each better than the one before."""
+        here = attached
+        cost = self._linear_cost([frame.residual_m for frame in frames], here[None])[0]
+        steps: list[Mask] = []
+        observable = self._observable(attached)
+        for _ in range(self._settings.flips_per_round):
+            blocks, sets = self._moves(here, observable)
+            costs = np.concatenate(
+                [
+                    self._linear_cost(
+                        [frame.predict(block, self._change(here, block, new)) for frame in frames],
+                        new,
+                    )
+                    for block, new in zip(blocks, sets, strict=True)
+                    if len(block)
+                ]
+                or [np.zeros(0)]
+            )
+            if len(costs) == 0 or costs.min() >= cost - 1e-3:
+                break
+            best = int(np.argmin(costs))
+            cost = costs[best]
+            new = np.concatenate(sets)[best]
+            flipped = np.flatnonzero(new != here)
+            change = self._change(here, flipped[None], new[None])[0]
+            frames = [frame.changed(flipped, change) for frame in frames]
+            here = new
+            steps.append(here)
+        return steps
+
+    def _moves(self, here: Mask, observable: Mask) -> tuple[list[Indices], list[Mask]]:
+        """Per block shape: useful blocks (b, q), and the sets (b, holes) that they lead to."""
+        blocks, sets = [], []
+        for height, width in BLOCKS:
+            windows = np.lib.stride_tricks.sliding_window_view(self._grid, (height, width))
+            each = windows.reshape(-1, height * width)
+            each = each[observable[each].all(axis=1)]
+            for holds in (True, False):
+                # Blocks of which only one hole would change are covered by smaller shapes.
+                useful = each[(here[each] != holds).sum(axis=1) > (height * width) // 2]
+                new = np.repeat(here[None], len(useful), axis=0)
+                np.put_along_axis(new, useful, holds, axis=1)
+                blocks.append(useful)
+                sets.append(new)
+        return blocks, sets
+
+    def _observable(self, attached: Mask) -> Mask:
+        """Holes that a frame can tell anything about: free and away from rest, or under load."""
+        s = self._settings
+        free = ~attached & (self._stretch_m > s.observable_stretch_m)
+        loaded = attached & (self._force_n > s.observable_force_share * self._force_n.max())
+        shape = self._grid.shape
+        near = np.zeros(shape, bool)
+        for row, column in np.argwhere(loaded.reshape(shape)):
+            near[max(0, row - 2) : row + 3, max(0, column - 2) : column + 3] = True
+        return free | (attached & near.ravel())
+
+    def _change(self, here: Mask, blocks: Indices, sets: Mask) -> Floats:
+        """Stiffness (b, q) that each hole of each block gains."""
+        after = np.take_along_axis(sets, blocks, axis=1).astype(float)
+        return RIGID_HOLE_N_PER_M * (after - here[blocks])
+
+    def _true_cost(self, attached: Mask, *, keep: bool) -> float:
+        """Cost from the model itself; infinite where it finds no shape."""
+        self._solves += len(self._frames)
+        stiffness = hole_stiffness_n_per_m(attached)
+        states = self._replay.shapes(stiffness, self._frames, keep=keep)
+        if states is None:
+            return float("inf")
+        compared = [
+            misfit(cells.points_m, state.surface, self._belief.depth_camera)
+            for cells, state in zip(self._cells, states, strict=True)
+        ]
+        known: list[Misfit] = [each for each in compared if each is not None]
+        if len(known) < len(compared):
+            return float("inf")
+        if keep:
+            self._misfits = known
+            forces = [np.linalg.norm(state.attachment_forces_n, axis=1) for state in states]
+            self._force_n = np.max(forces, axis=0)
+        residuals = [cells.residual_m(each) for cells, each in zip(self._cells, known, strict=True)]
+        return float(self._linear_cost(residuals, attached[None])[0])
+
+    def _linearise(self, attached: Mask) -> list[LinearisedFrame]:
+        """Every frame around its kept shape."""
+        holes = np.arange(len(attached))
+        frames = []
+        stretch = np.zeros(len(attached))
+        for frame, cells, compared in zip(self._frames, self._cells, self._misfits, strict=True):
+            response = self._replay.response(frame, hole_stiffness_n_per_m(attached), holes)
+            stretch = np.maximum(stretch, np.linalg.norm(response.stretch_m, axis=1))
+            frames.append(
+                LinearisedFrame(
+                    cells.residual_m(compared),
+                    cells.jacobian(compared, response),
+                    response.holes_m_per_n,
+                    response.stretch_m,
+                )
+            )
+        self._stretch_m = stretch
+        return frames
+
+    def _linear_cost(self, residuals_m: Sequence[Floats], sets: Mask) -> Floats:
+        """Cost (b,) of sets (b, holes) with the residuals ([b,] cells) of each frame."""
+        s = self._settings
+        limit = s.robust_m / s.error_m
+        cost = self._price(sets)
+        for residual in residuals_m:
+            size = np.abs(np.atleast_2d(residual)) / s.error_m
+            loss = np.where(size <= limit, 0.5 * size**2, limit * (size - 0.5 * limit))
+            cost = cost + loss.sum(axis=1)
+        return cost
+
+    def _price(self, sets: Mask) -> Floats:
+        """Price (b,) of departing from the belief."""
+        changed = (sets != self._believed).reshape(-1, *self._grid.shape)
+        edges = (changed[:, 1:] != changed[:, :-1]).sum(axis=(1, 2))
+        edges = edges + (changed[:, :, 1:] != changed[:, :, :-1]).sum(axis=(1, 2))
+        s = self._settings
+        return s.change_price * changed.sum(axis=(1, 2)) + s.edge_price * edges
+
+    def _probability(self, attached: Mask, frames: Sequence[LinearisedFrame]) -> Floats:
+        """Probability (holes,) of holding, from the cost of flipping each hole alone."""
+        holes = np.arange(len(attached))[:, None]
+        sets = np.repeat(attached[None], len(attached), axis=0)
+        np.put_along_axis(sets, holes, ~attached[:, None], axis=1)
+        change = self._change(attached, holes, sets)
+        flipped = self._linear_cost([frame.predict(holes, change) for frame in frames], sets)
+        now = self._linear_cost([frame.residual_m for frame in frames], attached[None])[0]
+        wrong = 1.0 / (1.0 + np.exp(np.clip(flipped - now, 0.0, 50.0)))
+        return np.where(attached, 1.0 - wrong, wrong)
