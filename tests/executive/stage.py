@@ -9,7 +9,8 @@ import numpy as np
 
 from defras_bt.executive.executive import Executive
 from defras_bt.executive.perception import Perception
-from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
+from defras_bt.recording.composite import CompositeRecorder
+from defras_bt.recording.record import Recorder, RunInfo, RunSummary, TickRecord
 from defras_sim.resources import resource
 from tests.nodes.bench import EPSILON_N, Bench
 
@@ -42,11 +43,17 @@ class Stage:
     """Ticks an executive one tick at a time, so that a test can change the world in between."""
 
     def __init__(
-        self, tree: str | Path, bench: Bench | None = None, *, max_time_s: float = 120.0
+        self,
+        tree: str | Path,
+        bench: Bench | None = None,
+        *,
+        max_time_s: float = 120.0,
+        beside: Sequence[Recorder] = (),
     ) -> None:
         self.bench = bench if bench is not None else Bench()
         self.operator_stop: str | None = None
         self.notes = Notes()
+        self.recorder = CompositeRecorder([self.notes, *beside])
         bench = self.bench
         perception = Perception(
             bench.board,
@@ -58,7 +65,7 @@ class Stage:
         )
         file = tree if isinstance(tree, Path) else resource(f"trees/{tree}.yaml")
         self.executive = Executive(
-            file, bench.context, bench.world, perception, self.notes, max_time_s
+            file, bench.context, bench.world, perception, self.recorder, max_time_s
         )
 
     @property

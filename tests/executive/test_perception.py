@@ -1,0 +1,180 @@
+"""Perception keeps twin, monitor, keyframes and grips in step with what is observed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from defras_bt.executive.perception import Perception
+from defras_sim.worlds.protocol import JAW_CLOSED_RAD, JAW_OPEN_RAD, ArmCommand, Command
+from tests.nodes.bench import EPSILON_N, Bench
+from tests.nodes.bench_services import MU_M
+
+NAN = float("nan")
+TICK_S = 0.05
+
+
+class Senses:
+    """A bench with perception alone: no tree, the test moves the tools."""
+
+    def __init__(self) -> None:
+        self.bench = Bench()
+        self.operator_stop: str | None = None
+        bench = self.bench
+        self.perception = Perception(
+            bench.board,
+            bench.twin,
+            bench.monitor,
+            bench.keyframes,
+            EPSILON_N,
+            lambda: self.operator_stop,
+        )
+
+    def look(self):
+        """The inputs of this tick; then a tick passes."""
+        world = self.bench.world
+        inputs = self.perception.update(world.ticks, world.observe())
+        world.step()
+        return inputs
+
+    def turn_jaw(self, jaw_rad: float) -> None:
+        self.bench.world.command(Command({"psm1": ArmCommand(jaw_rad=jaw_rad)}))
+        for _ in range(6):
+            self.look()
+
+    def grasp(self) -> None:
+        self.bench.put("psm1", (*self.bench.scene.grasp_xy_m(2, 4), 0.0))
+        self.bench.board.at["psm1"] = (2, 4)
+        self.turn_jaw(JAW_OPEN_RAD)
+        self.turn_jaw(JAW_CLOSED_RAD)
+
+
+@pytest.fixture
+def senses() -> Senses:
+    return Senses()
+
+
+class TestMissingReadings:
+    """Whatever is not there is said in words."""
+
+    def test_all_is_there(self, senses):
+        inputs = senses.look()
+        assert inputs.missing == ()
+        assert (inputs.tick, inputs.time_s) == (0, 0.0)
+        assert inputs.force_threshold_n == EPSILON_N
+
+    @pytest.mark.parametrize(("sensor", "word"), [("cloud_m", "cloud"), ("visibility", "visib")])
+    def test_a_silent_camera(self, senses, sensor, word):
+        setattr(senses.bench.world, sensor, None)
+        missing = senses.look().missing
+        assert missing
+        assert all(word in sentence for sentence in missing), missing
+
+    def test_a_tip_that_is_not_a_number(self, senses):
+        senses.bench.put("psm2", (NAN, 0.0, 0.0))
+        (sentence,) = senses.look().missing
+        assert "psm2" in sentence
+
+    def test_a_visibility_that_is_not_a_share(self, senses):
+        senses.bench.world.visibility = 1.2
+        assert any("1.2" in sentence for sentence in senses.look().missing)
+
+    def test_the_operator_is_asked_every_tick(self, senses):
+        assert senses.look().operator_stop is None
+        senses.operator_stop = "the pedal is pressed"
+        assert senses.look().operator_stop == "the pedal is pressed"
+
+
+class TestForce:
+    """Time over the threshold is counted without a break; the unknown counts as over."""
+
+    @pytest.mark.parametrize("force_n", [0.31, NAN, float("inf")])
+    def test_over_or_unknown(self, senses, force_n):
+        senses.grasp()
+        senses.bench.twin.feels_n = force_n
+        for ticks in (1, 2, 3):
+            np.testing.assert_equal(senses.look().force_n, force_n)
+            assert senses.bench.board.force_over_s == pytest.approx(ticks * TICK_S)
+
+    def test_a_moment_below_starts_the_count_anew(self, senses):
+        senses.grasp()
+        for force_n, over_s in ((0.4, 0.05), (0.4, 0.1), (0.3, 0.0), (0.4, 0.05)):
+            senses.bench.twin.feels_n = force_n
+            senses.look()
+            assert senses.bench.board.force_over_s == pytest.approx(over_s)
+
+
+class TestMonitoring:
+    """Rest frames before the first grasp, readings once calibrated."""
+
+    def test_no_reading_before_calibration(self, senses):
+        assert senses.look().reading is None
+
+    def test_afterwards_the_states_are_passed_on(self, senses):
+        for _ in range(3):
+            senses.look()
+        senses.bench.monitor.warn(2, "local")
+        reading = senses.look().reading
+        assert reading.warning_state == {"local": 2, "median": 0}
+        assert reading.mu_m["local"] == MU_M[2]
+
+    def test_rest_frames_are_taken_only_from_tissue_that_nobody_holds(self, senses):
+        senses.grasp()
+        frames = senses.bench.monitor.rest_frames
+        senses.look()
+        assert senses.bench.monitor.rest_frames == frames
+
+    def test_rest_frames_end_with_the_calibration(self, senses):
+        senses.bench.board.rest_calibrated = True
+        senses.look()
+        assert senses.bench.monitor.rest_frames == 0
+
+
+class TestGrips:
+    """A grip begins and ends with what the jaw says."""
+
+    def test_a_grip_begins(self, senses):
+        senses.grasp()
+        bench = senses.bench
+        grip = bench.board.grips["psm1"]
+        assert (grip.point, grip.done) == ((2, 4), ())
+        np.testing.assert_array_equal(grip.grasp_tip.position_m, bench.tip_m())
+        assert bench.twin.holding == {"psm1"}
+        assert bench.monitor.changes == 1
+
+    def test_a_grip_ends(self, senses):
+        senses.grasp()
+        bench = senses.bench
+        bench.board.unexplained = True
+        senses.turn_jaw(JAW_OPEN_RAD)
+        assert bench.board.grips == {}
+        assert bench.board.at == {}
+        assert bench.twin.holding == set()
+        assert bench.board.last_learning is None
+        assert not bench.board.unexplained
+        assert bench.monitor.changes == 2
+
+    def test_shapes_are_kept_while_tissue_is_held_and_forgotten_with_the_grip(self, senses):
+        keyframes = senses.bench.keyframes
+        senses.look()
+        assert keyframes.frames() == ()
+        senses.grasp()
+        assert keyframes.frames()
+        assert set(keyframes.frames()[-1].grasp_tips) == {"psm1"}
+        senses.turn_jaw(JAW_OPEN_RAD)
+        assert keyframes.frames() == ()
+
+    def test_a_missing_cloud_adds_no_shape(self, senses):
+        senses.grasp()
+        last_s = senses.bench.keyframes.frames()[-1].stamp_s
+        senses.bench.world.cloud_m = None
+        senses.look()
+        assert senses.bench.keyframes.frames()[-1].stamp_s == last_s
+
+    def test_a_grip_where_the_twin_has_no_tissue_is_an_error(self, senses):
+        def nothing_there(arm, tip):
+            raise ValueError("no tissue at the tip")
+
+        senses.bench.twin.grasp = nothing_there
+        with pytest.raises(ValueError, match="no tissue"):
+            senses.grasp()
