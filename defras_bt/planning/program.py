@@ -95,8 +95,8 @@ class RetractionProgram:
         """Facts out of ``removable`` that together rule out a plan of at most ``horizon`` actions.
 
         None if they do not. Only true external atoms can be removable; the others stay as they
-        are. No fact can be dropped from the answer, except where more than ``MAX_DELETIONS`` would
-        have had to be tried.
+        are. No fact can be dropped from the answer, except where trying would have taken more than
+        ``MAX_DELETIONS`` solves or one of them more than ``budget_s``.
         """
         self._aim(horizon)
         for step in range(1, horizon + 1):  # steps may be left out, so that shorter plans count
@@ -118,7 +118,10 @@ class RetractionProgram:
             if not untried:
                 break
             candidate = untried.pop(0)
-            smaller = self._core([*needed, *untried], budget_s)
+            try:
+                smaller = self._core([*needed, *untried], budget_s)
+            except PlanningTimeout:  # the facts left still rule out every plan
+                return (*needed, candidate, *untried)
             if smaller is None:
                 needed.append(candidate)
             else:
