@@ -75,7 +75,7 @@ def progress_line(record: TickRecord, info: RunInfo) -> Table:
     force = f"{record.force_n:.2f}" if math.isfinite(record.force_n) else "?"
     seen = record.observation.roi_visibility
     row = Table.grid(padding=(0, 2))
-    row.add_row(
+    cells = (
         Text(f"{record.time_s:6.1f} s", style="bold"),
         Text(_action(record)),
         Text(f"F {force}/{info.force_threshold_n:.2f} N", style="bold red" if over else ""),
@@ -83,6 +83,10 @@ def progress_line(record: TickRecord, info: RunInfo) -> Table:
         Text(f"rate {percent(record.rate)}", style="" if record.rate == 1 else "yellow"),
         Text(f"region {'?' if seen is None else percent(seen)}", style="cyan"),
     )
+    for _ in cells:
+        # One line, however narrow the terminal is.
+        row.add_column(no_wrap=True, overflow="ellipsis")
+    row.add_row(*cells)
     return row
 
 

@@ -233,9 +233,14 @@ class TimelineRecorder:
         if not self._changed("cloud", cloud.stamp_s):
             return
         colours: NDArray[np.uint8] | palette.Rgb = palette.MUTED
-        if record.reading is not None and len(record.reading.per_point_m) == len(cloud.points_m):
+        reading = record.reading
+        # The distances belong to the cloud that was monitored, which may be an earlier one.
+        if reading is not None and (reading.stamp_s, len(reading.per_point_m)) == (
+            cloud.stamp_s,
+            len(cloud.points_m),
+        ):
             delta_m = info.scene.thresholds.delta_m
-            colours = palette.discrepancy_colours(record.reading.per_point_m, delta_m)
+            colours = palette.discrepancy_colours(reading.per_point_m, delta_m)
         # Its own path: rerun draws either points or a mesh at one place of the tree.
         points = rr.Points3D(cloud.points_m.astype(np.float32), colors=colours, radii=0.0009)
         self._log("world/tissue/observed", points)

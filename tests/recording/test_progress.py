@@ -68,3 +68,10 @@ def test_the_row(short_run: SyntheticRun) -> None:
 )
 def test_what_is_unknown(short_run: SyntheticRun, changes: dict[str, object], words: str) -> None:
     assert words in row(short_run, 106, **changes)
+
+
+def test_a_narrow_terminal_gets_one_line(short_run: SyntheticRun) -> None:
+    console = Console(file=StringIO(), width=50, color_system=None)
+    with console.capture() as captured:
+        console.print(progress_line(short_run.ticks()[106], short_run.info))
+    assert captured.get().count("\n") == 1
