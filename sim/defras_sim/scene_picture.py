@@ -148,7 +148,7 @@ def _draw_space(axes: Axes3D, scene: Scene, true: Scene) -> None:
         axes.text(line[0, 0], line[0, 1], line[0, 2] + 12, arm, color=ARM_COLOURS[arm], ha="center")
     axes.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
     axes.set_aspect("equal")
-    axes.set_box_aspect(None, zoom=1.15)
+    axes.set_box_aspect(None, zoom=1.05)
     axes.view_init(elev=24, azim=-115)
 
 

@@ -69,6 +69,16 @@ def test_it_is_at_rest_without_grasps(believed: Scene) -> None:
     assert np.abs(state.surface.vertices_m[state.surface.upper][:, 2]).max() < 1e-9
 
 
+def test_grasp_and_attachment_forces_balance(believed: Scene) -> None:
+    twin, _ = lifted(believed, 0.03)
+    state = twin.state
+    grasp_n = state.grasp_forces_n["psm1"]
+    assert twin.force_n == pytest.approx(float(np.linalg.norm(grasp_n)))
+    rest_n = grasp_n + state.attachment_forces_n.sum(axis=0)
+    assert np.linalg.norm(rest_n) < 0.01 * twin.force_n
+    assert np.all(state.attachment_forces_n[~believed.attached] == 0.0)
+
+
 def test_nothing_is_solved_while_nothing_moves(believed: Scene) -> None:
     twin, tip = lifted(believed)
     before = twin.state
