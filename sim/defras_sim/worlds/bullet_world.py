@@ -1,0 +1,173 @@
+"""BulletWorld: PyBullet's deformable tissue, two jointed arms, and rendered cameras.
+
+Nothing is handed over that a real set-up would not have: pictures, joints and jaws.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pybullet
+from pybullet_utils.bullet_client import BulletClient
+
+from defras_sim.geometry import Floats
+from defras_sim.scene import Scene
+from defras_sim.surface import Surface
+from defras_sim.worlds.bullet_arm import BulletArm
+from defras_sim.worlds.bullet_camera import take_picture
+from defras_sim.worlds.bullet_tissue import BulletTissue
+from defras_sim.worlds.colours import BED, ROI
+from defras_sim.worlds.error import WorldError
+from defras_sim.worlds.jaw_contact import distance_to_upper_m
+from defras_sim.worlds.kinematic_tool import JAW_ON_TISSUE_RAD
+from defras_sim.worlds.protocol import (
+    HOLD,
+    JAW_OPEN_RAD,
+    ArmCommand,
+    Command,
+    Observation,
+)
+
+GRASP_REACH_M = 0.004
+_ROI_DISC_M = 0.0002
+_BED_HALF_M = 0.25
+_EXPLODED_M = 1.0
+
+
+class BulletWorld:
+    """A dynamic reality for a scene. Equal scenes, commands and generators give equal runs."""
+
+    name = "bullet"
+
+    def __init__(self, scene: Scene, rng: np.random.Generator) -> None:
+        """``scene`` is the actual one. ``rng`` makes the depth camera's noise."""
+        self.tick_s = scene.tick_s
+        self._scene = scene
+        self._rng = rng
+        self._ticks = 0
+        self._steps = max(1, round(scene.tick_s / scene.simulation.bullet_step_s))
+        self._command = HOLD
+        self._client: Any = BulletClient(connection_mode=pybullet.DIRECT)
+        self._client.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
+        self._client.setGravity(0, 0, 0)
+        self._client.setTimeStep(scene.tick_s / self._steps)
+        self._draw_bed()
+        self._tissue = BulletTissue(self._client, scene)
+        self._arms = {
+            name: BulletArm(self._client, name, np.array(arm.rcm_m), np.array(arm.home_tip_m))
+            for name, arm in scene.arms.items()
+        }
+        self._forces_n = dict.fromkeys(self._arms, 0.0)
+        self._latest = Observation(0.0, {})
+        self._sense()
+
+    @property
+    def time_s(self) -> float:
+        return self._ticks * self.tick_s
+
+    def observe(self) -> Observation:
+        return self._latest
+
+    def command(self, command: Command) -> None:
+        """Set the motion of the coming tick.
+
+        Raises:
+            ValueError: an arm is unknown or a number is not finite.
+        """
+        for arm, motion in command.arms.items():
+            if arm not in self._arms:
+                raise ValueError(f"no arm {arm!r}; this world has {', '.join(self._arms)}")
+            jaw = 0.0 if motion.jaw_rad is None else motion.jaw_rad
+            if not np.isfinite([*motion.linear_m_s, *motion.angular_rad_s, jaw]).all():
+                raise ValueError(f"the command for {arm} is not finite: {motion}")
+        self._command = command
+
+    def step(self) -> None:
+        """Let ``tick_s`` of world time pass.
+
+        Raises:
+            WorldError: the tissue exploded, or an arm was sent where it cannot go.
+        """
+        self._ticks += 1
+        for name, arm in self._arms.items():
+            arm.begin_tick(self._command.arms.get(name, ArmCommand()), self.tick_s)
+            self._update_grip(arm)
+        self._command = HOLD
+        for number in range(1, self._steps + 1):
+            for arm in self._arms.values():
+                arm.drive(number / self._steps)
+            self._client.stepSimulation()
+        self._check_sound()
+        self._sense()
+
+    def true_force_n(self) -> float:
+        return max(arm.force_n() for arm in self._arms.values())
+
+    def true_surface(self) -> Surface:
+        return self._tissue.surface()
+
+    def close(self) -> None:
+        if self._client is not None:
+            self._client.disconnect()
+            self._client = None
+
+    def _update_grip(self, arm: BulletArm) -> None:
+        """A jaw that closes from wide open on tissue takes it; one that opens lets go."""
+        if arm.jaw_rad > 0.75 * JAW_OPEN_RAD:
+            arm.armed = True
+        if arm.anchors and arm.jaw_rad > JAW_ON_TISSUE_RAD + 1e-9:
+            self._tissue.let_go(arm.anchors)
+            arm.anchors = []
+        elif arm.armed and not arm.anchors and arm.jaw_rad <= JAW_ON_TISSUE_RAD:
+            arm.armed = False
+            tip_m = arm.measured().position_m
+            if distance_to_upper_m(self._tissue.surface(), tip_m) < GRASP_REACH_M:
+                nodes = self._tissue.patch_at(tip_m)
+                arm.anchors = self._tissue.grip(arm.grip, arm.carry(), nodes)
+                arm.jaw_rad = JAW_ON_TISSUE_RAD
+
+    def _check_sound(self) -> None:
+        nodes_m = self._tissue.nodes_m()
+        if not np.isfinite(nodes_m).all() or np.abs(nodes_m).max() > _EXPLODED_M:
+            raise WorldError(
+                f"at {self.time_s:.2f} s PyBullet's tissue became unstable; a smaller "
+                "simulation.bullet_step_s, or a coarser bullet_elements_xyz, keeps it stable"
+            )
+
+    def _sense(self) -> None:
+        """Read every sensor that is due; the others keep their last reading."""
+        scene, time_s = self._scene, self.time_s
+        arms = {name: arm.observe(time_s) for name, arm in self._arms.items()}
+        update = replace(self._latest, time_s=time_s, arms=arms)
+        if self._due(scene.depth_camera.period_s):
+            picture = take_picture(self._client, scene.depth_camera, time_s, self._rng)
+            update = replace(update, depth_image=picture)
+        if self._due(scene.endoscope.period_s):
+            picture = take_picture(self._client, scene.endoscope, time_s, None)
+            update = replace(update, endoscope_image=picture)
+        self._latest = update
+
+    def _due(self, period_s: float) -> bool:
+        """Whether a multiple of ``period_s`` lies in the tick that just passed."""
+        if self._ticks == 0:
+            return True
+        periods = np.floor(np.array([self._ticks - 1, self._ticks]) * self.tick_s / period_s + 1e-6)
+        return bool(periods[1] > periods[0])
+
+    def _draw_bed(self) -> None:
+        """The bed and the region on it: seen, never felt."""
+        client, center_m = self._client, self._scene.roi_center_m
+        bed = client.createVisualShape(
+            client.GEOM_BOX, halfExtents=[_BED_HALF_M, _BED_HALF_M, 0.001], rgbaColor=[*BED, 1]
+        )
+        region = client.createVisualShape(
+            client.GEOM_CYLINDER,
+            radius=self._scene.roi.radius_m,
+            length=_ROI_DISC_M,
+            rgbaColor=[*ROI, 1],
+        )
+        below_m: Floats = np.array([0.0, 0.0, center_m[2] - 0.001 - _ROI_DISC_M])
+        client.createMultiBody(0, -1, bed, list(below_m))
+        client.createMultiBody(0, -1, region, list(center_m))
