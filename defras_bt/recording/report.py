@@ -23,7 +23,7 @@ from defras_bt.recording.report_plots import (
 )
 from defras_bt.recording.run_log import STATUSES, RunLog
 from defras_bt.recording.scene_picture import endoscope_view, field_view, picture
-from defras_bt.recording.story import newton, outcome_sentence, outcome_title, percent, times
+from defras_bt.recording.story import newton, outcome_title, percent, result_sentence, times
 from defras_bt.recording.tree_layout import tree_order
 
 
@@ -80,7 +80,7 @@ def report_html(log: RunLog, summary: RunSummary) -> str:
     values = summary.values
     return environment.get_template("report.html").render(
         title=outcome_title(values["outcome"]),
-        lead=outcome_sentence(summary),
+        lead=result_sentence(summary),
         good=values["outcome"] == "goal",
         info=log.info,
         values=values,
@@ -107,6 +107,8 @@ def _tiles(values: Any) -> list[Tile]:
     seen, over = values["roi_visibility"], values["ticks_over_threshold"]
     warnings, updates = values["warnings"], values["attachment_updates"]
     raised = [f"{warnings[state]} × state {state}" for state in "123" if warnings[state]]
+    replans = values["replans"]
+    anew = f"planned anew {times(replans)}" if replans else "never planned anew"
     limit = f"limit {newton(values['force_threshold_n'])}"
     return [
         Tile(
@@ -115,7 +117,7 @@ def _tiles(values: Any) -> list[Tile]:
             "at the end",
             "good" if values["outcome"] == "goal" else "bad",
         ),
-        Tile("Actions", str(values["actions"]), f"planned anew {times(values['replans'])}"),
+        Tile("Actions", str(values["actions"]), anew),
         Tile("Warnings", str(sum(warnings.values())), ", ".join(raised) or "the model agreed"),
         Tile(
             "Attachment updates",

@@ -25,18 +25,15 @@ def outcome_title(outcome: str) -> str:
 
 def outcome_sentence(summary: RunSummary) -> str:
     """Like ``Goal reached: 94 % of the region is visible after 9 actions.``"""
-    values = summary.values
-    seen = values["roi_visibility"]
-    visible = (
-        "the region's visibility is unknown"
-        if seen is None
-        else f"{percent(seen)} of the region is visible"
-    )
-    count = values["actions"]
-    return (
-        f"{outcome_title(values['outcome'])}: {visible} after "
-        f"{count} {'action' if count == 1 else 'actions'}."
-    )
+    return f"{outcome_title(summary.values['outcome'])}: {result_sentence(summary)}"
+
+
+def result_sentence(summary: RunSummary) -> str:
+    """Like ``94 % of the region is visible after 9 actions.``"""
+    seen, count = summary.values["roi_visibility"], summary.values["actions"]
+    share = "an unknown share" if seen is None else percent(seen)
+    actions = "action" if count == 1 else "actions"
+    return f"{share} of the region is visible after {count} {actions}."
 
 
 def percent(share: float) -> str:
@@ -44,8 +41,8 @@ def percent(share: float) -> str:
 
 
 def times(count: int) -> str:
-    """``never``, ``once``, ``twice``, ``3 times``."""
-    return ("never", "once", "twice")[count] if count < 3 else f"{count} times"
+    """``once``, ``twice``, ``3 times``."""
+    return {1: "once", 2: "twice"}.get(count, f"{count} times")
 
 
 def newton(force_n: float | None) -> str:

@@ -98,6 +98,7 @@ def test_a_run_that_failed_before_its_first_tick(tmp_path: Path, short_run: Synt
     said = page(short_run, tmp_path / "report.html", "error", ticks=0)
     assert "Stopped by an error" in said
     assert "The run ended before anything happened." in said
+    assert "an unknown share of the region is visible after 0 actions." in said
 
 
 def test_what_events_say_is_text_and_not_markup(tmp_path: Path, short_run: SyntheticRun) -> None:
