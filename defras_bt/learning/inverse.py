@@ -43,6 +43,8 @@ class InverseEstimator:
     search: SearchSettings = field(default_factory=SearchSettings)
     rule: AdoptionRule = field(default_factory=AdoptionRule)
     search_cell_m: float = 0.02
+    coarse_rounds: int = 8
+    fine_rounds: int = 3
     most_fitted: int = 3
     least_travel_m: float = 0.005
 
@@ -56,9 +58,10 @@ class InverseEstimator:
         if not parts.fitted:
             return _kept(belief, "the tissue has not been moved far enough to tell anything")
         try:
-            found = self._search(belief, keyframes, parts)
+            start = self._search_coarse(belief, keyframes, parts)
             replay = Replay(belief, keyframes)
             before = replay.repeat(hole_stiffness_n_per_m(belief.attached))
+            found = self._search_fine(belief, replay, parts, start)
         except NotRepeatable as fault:
             return _kept(belief, f"the observed motion cannot be repeated: {fault}")
         if np.array_equal(found.attached, belief.attached):
@@ -85,15 +88,29 @@ class InverseEstimator:
             f"{1e3 * evidence.before_m:.2f} to {1e3 * evidence.after_m:.2f} mm",
         )
 
-    def _search(self, belief: Scene, keyframes: Sequence[Keyframe], parts: Split) -> SearchResult:
+    def _search_coarse(self, belief: Scene, keyframes: Sequence[Keyframe], parts: Split) -> Mask:
+        """Most of the way, on a mesh on which a round takes a fraction of a second."""
         tissue = belief.tissue
         cells = np.array([tissue.length_x_m, tissue.width_y_m]) / self.search_cell_m
         x, y = (max(2, int(np.ceil(count - 1e-9))) for count in cells)
         coarse = (x, y, 1) if tissue.element == "hexahedron20" else tissue.elements_xyz
         replay = Replay(belief, keyframes, coarse)
         replay.repeat(hole_stiffness_n_per_m(belief.attached))
+        return (
+            self._searcher(belief, replay, parts).run(belief.attached, self.coarse_rounds).attached
+        )
+
+    def _search_fine(
+        self, belief: Scene, replay: Replay, parts: Split, start: Mask
+    ) -> SearchResult:
+        """The last steps from the better of ``start`` and the belief, on the scene's own mesh."""
+        searcher = self._searcher(belief, replay, parts)
+        better = start if searcher.cost(start) < searcher.cost(belief.attached) else belief.attached
+        return searcher.run(better, self.fine_rounds)
+
+    def _searcher(self, belief: Scene, replay: Replay, parts: Split) -> AttachmentSearch:
         points, frames = parts.fitted_points_m, parts.fitted
-        return AttachmentSearch(belief, replay, points, frames, self.search).run()
+        return AttachmentSearch(belief, replay, points, frames, self.search)
 
     def _objection(self, evidence: Evidence, worsening_m: float) -> str | None:
         """Why the proposal is not believed; None if it is."""

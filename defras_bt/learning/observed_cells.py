@@ -41,7 +41,7 @@ class ObservedCells:
         return np.asarray(self.mean @ compared.residual_m)
 
     def jacobian(self, compared: Misfit, response: HoleResponse) -> Floats:
-        """Derivative (cells, holes, 3) of :meth:`residual_m` by the force at each hole."""
+        """Derivative (cells, holes, 9) of :meth:`residual_m` by the force at each hole."""
         surface = response.surface_m_per_n
         flat = surface.reshape(*surface.shape[:2], -1)
         cells = np.asarray(self.mean @ compared.jacobian(flat))

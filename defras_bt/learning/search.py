@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from defras_bt.learning.linearised import Indices, LinearisedFrame
 from defras_bt.learning.misfit import Misfit, misfit
@@ -18,6 +19,7 @@ from defras_bt.learning.observed_cells import ObservedCells
 from defras_bt.learning.replay import Replay, hole_stiffness_n_per_m
 from defras_sim.geometry import Floats
 from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene
+from defras_sim.surface import Surface
 
 Mask = NDArray[np.bool_]
 
@@ -28,7 +30,7 @@ get stuck: letting go one hole of a patch changes next to nothing while its neig
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """What departing from the belief costs, and how long to search.
+    """What departing from the belief costs, and how far to trust linearity.
 
     A cell's squared error counts in units of ``error_m``, the accuracy of the model rather than
     of the camera, and grows only linearly beyond ``robust_m``, where the closest point is likely
@@ -40,9 +42,8 @@ class SearchSettings:
     robust_m: float = 0.004
     change_price: float = 0.5
     edge_price: float = 0.25
-    rounds: int = 8
     flips_per_round: int = 6
-    observable_stretch_m: float = 0.0005
+    observable_stretch_m: float = 0.001
     observable_force_share: float = 0.02
 
 
@@ -78,20 +79,19 @@ class AttachmentSearch:
         self._believed = belief.attached
         self._grid = np.arange(len(self._believed)).reshape(belief.hole_counts[::-1])
         self._solves = 0
+        self._place_of = np.full(len(self._believed), -1)
+        """Where each hole lies in the linearised frames; -1: nothing can be told about it."""
 
-    def run(self) -> SearchResult:
-        """Search from the belief. A set that the model cannot take is never chosen."""
-        attached = self._believed
+    def run(self, start: Mask, rounds: int) -> SearchResult:
+        """Search from ``start`` (holes,), whose shapes the replay holds.
+
+        A set that the model cannot take is never chosen.
+        """
+        attached = start
         cost = before = self._true_cost(attached, keep=True)
         linearised = self._linearise(attached)
-        for _ in range(self._settings.rounds):
-            advised = self._advise(attached, linearised)
-            found: tuple[Mask, float] | None = None
-            while advised and found is None:
-                value = self._true_cost(advised[-1], keep=False)
-                if value < cost - 1e-6:
-                    found = advised[-1], value
-                advised = advised[: len(advised) // 2]
+        for _ in range(rounds):
+            found = self._first_better(self._advise(attached, linearised), cost)
             if found is None:
                 break
             attached, cost = found
@@ -100,18 +100,34 @@ class AttachmentSearch:
         probability = self._probability(attached, linearised)
         return SearchResult(attached, probability, before, cost, self._solves)
 
+    def cost(self, attached: Mask) -> float:
+        """What a set costs: misfit and price of departing from the belief."""
+        return self._true_cost(attached, keep=False)
+
+    def _first_better(self, advised: Sequence[Mask], cost: float) -> tuple[Mask, float] | None:
+        """The longest of a descent's sets, each half of the one before, that truly is better."""
+        while advised:
+            value = self._true_cost(advised[-1], keep=False)
+            if value < cost - 1e-6:
+                return advised[-1], value
+            advised = advised[: len(advised) // 2]
+        return None
+
     def _advise(self, attached: Mask, frames: Sequence[LinearisedFrame]) -> list[Mask]:
         """Sets along a greedy descent of the linearised cost, each better than the one before."""
         here = attached
         cost = self._linear_cost([frame.residual_m for frame in frames], here[None])[0]
         steps: list[Mask] = []
-        observable = self._observable(attached)
+        observable = self._place_of >= 0
         for _ in range(self._settings.flips_per_round):
             blocks, sets = self._moves(here, observable)
             costs = np.concatenate(
                 [
                     self._linear_cost(
-                        [frame.predict(block, self._change(here, block, new)) for frame in frames],
+                        [
+                            frame.predict(self._place_of[block], self._change(here, block, new))
+                            for frame in frames
+                        ],
                         new,
                     )
                     for block, new in zip(blocks, sets, strict=True)
@@ -126,7 +142,7 @@ class AttachmentSearch:
             new = np.concatenate(sets)[best]
             flipped = np.flatnonzero(new != here)
             change = self._change(here, flipped[None], new[None])[0]
-            frames = [frame.changed(flipped, change) for frame in frames]
+            frames = [frame.changed(self._place_of[flipped], change) for frame in frames]
             here = new
             steps.append(here)
         return steps
@@ -181,17 +197,19 @@ class AttachmentSearch:
             self._misfits = known
             forces = [np.linalg.norm(state.attachment_forces_n, axis=1) for state in states]
             self._force_n = np.max(forces, axis=0)
+            moved = [_moved_m(state.surface, self._belief) for state in states]
+            self._stretch_m = np.max(moved, axis=0)
         residuals = [cells.residual_m(each) for cells, each in zip(self._cells, known, strict=True)]
         return float(self._linear_cost(residuals, attached[None])[0])
 
     def _linearise(self, attached: Mask) -> list[LinearisedFrame]:
         """Every frame around its kept shape."""
-        holes = np.arange(len(attached))
+        holes = np.flatnonzero(self._observable(attached))
+        self._place_of[:] = -1
+        self._place_of[holes] = np.arange(len(holes))
         frames = []
-        stretch = np.zeros(len(attached))
         for frame, cells, compared in zip(self._frames, self._cells, self._misfits, strict=True):
             response = self._replay.response(frame, hole_stiffness_n_per_m(attached), holes)
-            stretch = np.maximum(stretch, np.linalg.norm(response.stretch_m, axis=1))
             frames.append(
                 LinearisedFrame(
                     cells.residual_m(compared),
@@ -200,7 +218,6 @@ class AttachmentSearch:
                     response.stretch_m,
                 )
             )
-        self._stretch_m = stretch
         return frames
 
     def _linear_cost(self, residuals_m: Sequence[Floats], sets: Mask) -> Floats:
@@ -224,11 +241,24 @@ class AttachmentSearch:
 
     def _probability(self, attached: Mask, frames: Sequence[LinearisedFrame]) -> Floats:
         """Probability (holes,) of holding, from the cost of flipping each hole alone."""
-        holes = np.arange(len(attached))[:, None]
-        sets = np.repeat(attached[None], len(attached), axis=0)
-        np.put_along_axis(sets, holes, ~attached[:, None], axis=1)
-        change = self._change(attached, holes, sets)
-        flipped = self._linear_cost([frame.predict(holes, change) for frame in frames], sets)
-        now = self._linear_cost([frame.residual_m for frame in frames], attached[None])[0]
-        wrong = 1.0 / (1.0 + np.exp(np.clip(flipped - now, 0.0, 50.0)))
+        holes = np.arange(len(attached))
+        sets = attached ^ np.eye(len(holes), dtype=bool)
+        price = self._price(sets) - self._price(attached[None])
+        seen = np.flatnonzero(self._place_of >= 0)[:, None]
+        if len(seen):
+            change = self._change(attached, seen, sets[seen[:, 0]])
+            place = self._place_of[seen]
+            flipped = [frame.predict(place, change) for frame in frames]
+            now = self._linear_cost([frame.residual_m for frame in frames], attached[None])
+            price[seen[:, 0]] = self._linear_cost(flipped, sets[seen[:, 0]]) - now
+        wrong = 1.0 / (1.0 + np.exp(np.clip(price, 0.0, 50.0)))
         return np.where(attached, 1.0 - wrong, wrong)
+
+
+def _moved_m(surface: Surface, scene: Scene) -> Floats:
+    """How far (holes,) the lower face has moved off each hole."""
+    lower = np.flatnonzero(~surface.upper)
+    nearest = cKDTree(surface.rest_xy_m[lower]).query(scene.holes_xy_m)[1]
+    over = lower[nearest]
+    rest = np.column_stack([surface.rest_xy_m[over], np.full(len(over), -scene.tissue.thickness_m)])
+    return np.asarray(np.linalg.norm(surface.vertices_m[over] - rest, axis=1))

@@ -178,20 +178,21 @@ class TissueModel:
         return surface.reshape(-1, 3, len(holes))
 
     def response_to_hole_forces(self, holes: Integers) -> HoleResponse:
-        """Linear response of the surface and of ``holes`` to a force at each of ``holes``."""
+        """Linear response of the surface and of ``holes`` to forces where ``holes`` hold."""
         x = self._positions_m
         chosen = np.asarray(holes, dtype=np.int64)
-        means = ROWS * chosen
-        on_holes = self._hole_rows[means].toarray()
-        stretch = on_holes @ x - self._hole_targets_m[means]
-        forces = np.kron(on_holes.T, np.eye(3))
-        motion = self._solver.solve_tangent(self._energy.tangent(x), forces)
+        rows = (ROWS * chosen[:, None] + np.arange(ROWS)).ravel()
+        on_holes = self._hole_rows[rows].toarray()
+        stretch = on_holes @ x - self._hole_targets_m[rows]
+        motion = self._solver.solve_tangent(
+            self._energy.tangent(x), np.kron(on_holes.T, np.eye(3))
+        )
         by_node = motion.reshape(len(x), -1)
-        shape = (3, len(chosen), 3)
+        count, size = len(chosen), 3 * ROWS
         return HoleResponse(
-            (self._surface.from_nodes @ by_node).reshape(-1, *shape),
-            (on_holes @ by_node).reshape(-1, *shape),
-            stretch,
+            (self._surface.from_nodes @ by_node).reshape(-1, 3, count, size),
+            (on_holes @ by_node).reshape(count, size, count, size),
+            stretch.reshape(count, size),
         )
 
     def _changed(self) -> None:
