@@ -17,7 +17,6 @@ from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
 from defras_bt.recording.report_plots import (
     attachments_svg,
     depth_picture,
-    held_by,
     png_uri,
     signals_svg,
 )
@@ -197,7 +196,7 @@ def _attachments(log: RunLog) -> Markup:
     if learned:
         begin_s, held = learned[-1]
         columns.append((f"Believed at the end (from {begin_s:.1f} s)", held))
-    actual = held_by(log.info)
+    actual = None if log.info.actual is None else log.info.actual.attached
     if actual is not None:
         columns.append(("Actual", actual))
     return Markup(attachments_svg(log.info.scene, tuple(columns), actual))

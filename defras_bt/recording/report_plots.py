@@ -17,7 +17,6 @@ from PIL import Image
 
 from defras_bt.recording import palette
 from defras_bt.recording.palette import css
-from defras_bt.recording.record import RunInfo
 from defras_bt.recording.run_log import RunLog, Span
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
@@ -246,8 +245,3 @@ def _svg(figure: Figure, title: str) -> str:
     text = text[text.index("<svg") :]
     # The page's style sheet sizes the figure.
     return re.sub(r'(<svg[^>]*?) width="[^"]*" height="[^"]*"', r"\1", text, count=1)
-
-
-def held_by(info: RunInfo) -> NDArray[np.bool_] | None:
-    """The actual attachments (holes,), None where nobody knows them."""
-    return None if info.actual is None else info.actual.attached
