@@ -10,6 +10,7 @@ import numpy as np
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import RIGID_HOLE_N_PER_M, ElementName, MaterialName, Scene
 from defras_sim.tissue.assembly import ElasticBody
+from defras_sim.tissue.bed import bed_under
 from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.grasp import Grasp, NothingToGrasp, grasped_disc, nearest_on_upper_face
 from defras_sim.tissue.hole_response import HoleResponse
@@ -23,9 +24,11 @@ from defras_sim.tissue.surface import surface_map
 
 __all__ = ["NothingToGrasp", "TissueModel", "TissueSnapshot"]
 
-# Of the tip between two equilibria on the way to a far one; and of Newton's method on that way.
+# Of the tip between two equilibria on the way to a far one.
 MAX_TIP_STEP_M = 0.004
-MAX_ITERATIONS = 200
+# Of Newton's method, beside those for each such step: a solve that fails should fail soon.
+SPARE_ITERATIONS = 80
+ITERATIONS_PER_STEP = 10
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ class TissueModel:
         name = material or tissue.material
         mu, lam = lame_parameters(name, tissue.young_modulus_pa, tissue.poisson_ratio)
         self._body = ElasticBody(self.mesh, name, mu, lam)
+        self._bed = bed_under(self.mesh, tissue) if tissue.bed else None
         self._surface = surface_map(self.mesh, tissue)
         self._hole_rows = disc_rows(
             self.mesh, scene.holes_xy_m, scene.attachments.hole_radius_m, -tissue.thickness_m
@@ -184,9 +188,7 @@ class TissueModel:
         rows = (ROWS * chosen[:, None] + np.arange(ROWS)).ravel()
         on_holes = self._hole_rows[rows].toarray()
         stretch = on_holes @ x - self._hole_targets_m[rows]
-        motion = self._solver.solve_tangent(
-            self._energy.tangent(x), np.kron(on_holes.T, np.eye(3))
-        )
+        motion = self._solver.solve_tangent(self._energy.tangent(x), np.kron(on_holes.T, np.eye(3)))
         by_node = motion.reshape(len(x), -1)
         count, size = len(chosen), 3 * ROWS
         return HoleResponse(
@@ -203,7 +205,7 @@ class TissueModel:
     def _assembled(self) -> PotentialEnergy:
         springs = [Springs(self._hole_rows, np.repeat(self._hole_stiffness, ROWS))]
         springs += [grasp.springs for grasp in self._grasps.values()]
-        return PotentialEnergy(self._body, joined(springs), self._targets_m())
+        return PotentialEnergy(self._body, joined(springs), self._targets_m(), self._bed)
 
     def _targets_m(self) -> Floats:
         held = [grasp.targets_m for grasp in self._grasps.values()]
@@ -223,10 +225,11 @@ class TissueModel:
         """Go to ``tips`` through equilibria; (arrived, iterations). Stops at the last good one."""
         starts = self._tips()
         way = length_m(starts, tips)
-        step = 1.0 / max(1.0, np.ceil(way / MAX_TIP_STEP_M))
-        smallest = step / 32 if way > 0 else step
-        share, iterations = 0.0, 0
-        while share < 1.0 and step >= smallest and iterations <= MAX_ITERATIONS:
+        steps = max(1.0, np.ceil(way / MAX_TIP_STEP_M))
+        step = 1.0 / steps
+        smallest = step / 16 if way > 0 else step
+        share, iterations, most = 0.0, 0, SPARE_ITERATIONS + ITERATIONS_PER_STEP * steps
+        while share < 1.0 and step >= smallest and iterations <= most:
             aim = min(1.0, share + step)
             solution = self._step_to(
                 {arm: between(start, tips[arm], aim) for arm, start in starts.items()}

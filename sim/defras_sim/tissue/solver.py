@@ -31,7 +31,7 @@ class NewtonSettings:
     """``residual_n`` is the norm of the unbalanced nodal forces at which a solve has converged."""
 
     residual_n: float
-    max_iterations: int = 40
+    max_iterations: int = 60
     max_cg_iterations: int = 12
     cg_tolerance: float = 1e-3
     max_step_m: float = 0.01
@@ -71,7 +71,7 @@ class NewtonSolver:
             if float(np.linalg.norm(gradient)) <= settings.residual_n:
                 return Solution(x, True, iteration)
             tangent = energy.tangent(x)
-            scale = float(tangent.diagonal().mean())
+            scale = float(np.median(tangent.diagonal()))
             moved = None
             while moved is None and shift <= 10.0:
                 direction = self._direction(tangent, gradient, shift * scale)

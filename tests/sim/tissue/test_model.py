@@ -162,6 +162,20 @@ def test_fold_over_by_sixty_millimetres():
     assert state.strain_energy_j > 0
 
 
+def test_refining_the_mesh_changes_neither_attachments_nor_patch():
+    """Shape and force of a lift converge: what is held does not depend on where nodes lie."""
+    states = [
+        retract(model(elements_xyz=cells), GRASP, LIFTED)
+        for cells in ((6, 6, 1), (8, 8, 1), (11, 11, 1))
+    ]
+    coarse, middle, fine = (state.surface.vertices_m for state in states)
+    distances = [np.linalg.norm(shape - fine, axis=1) for shape in (coarse, middle)]
+    assert distances[1].mean() < distances[0].mean() < 1e-3
+    assert distances[1].max() < 2e-3
+    forces = [np.linalg.norm(state.grasp_forces_n["psm1"]) for state in states]
+    np.testing.assert_allclose(forces[:2], forces[2], rtol=0.15)
+
+
 def test_softer_holes_give_way():
     tissue = model()
     rigid = retract(tissue, GRASP, LIFTED)
