@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
 from defras_bt.learning.evidence import Evidence, compare
 from defras_bt.learning.hold_out import Split, split
 from defras_bt.learning.misfit import misfit
+from defras_bt.learning.registration import fitted_registration
 from defras_bt.learning.replay import NotRepeatable, Replay, hole_stiffness_n_per_m
 from defras_bt.learning.search import AttachmentSearch, Mask, SearchResult, SearchSettings
 from defras_bt.monitoring.local import LocalMetric
@@ -26,13 +27,15 @@ class AdoptionRule:
 
     The gain has to be one that chance gives in fewer than ``chance`` of cases, at least
     ``relative_gain`` of the whole distance, at least ``local_gain_m`` where anything changes, and
-    must not make the worst neighbourhood of any frame worse by more than ``worse_m``.
+    must not make the worst neighbourhood of any frame worse by more than ``worse_m``. A camera that
+    stands elsewhere, fitted to the same points, must not do ``rival_share`` of it.
     """
 
     chance: float = 0.01
     relative_gain: float = 0.1
     local_gain_m: float = 0.0002
     worse_m: float = 0.0005
+    rival_share: float = 0.7
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ class InverseEstimator:
             return _kept(belief, f"the proposed attachments fail: {fault}", found, error)
         evidence = _judge(belief, parts, before, after, rng)
         worse = _worsening_m(belief, keyframes, before, after)
-        objection = self._objection(evidence, worse)
+        objection = self._objection(evidence, worse) or self._rival(belief, parts, before, evidence)
         changed = int(np.sum(found.attached != belief.attached))
         return AttachmentEstimate(
             attached=found.attached if objection is None else belief.attached,
@@ -131,6 +134,28 @@ class InverseEstimator:
                 f"{1e3 * worsening_m:.1f} mm worse"
             )
         return None
+
+    def _rival(
+        self, belief: Scene, parts: Split, before: Sequence[TissueState], evidence: Evidence
+    ) -> str | None:
+        """Whether a misplaced camera explains the same; None if it does not."""
+        surfaces = [before[frame].surface for frame in parts.fitted]
+        moved = fitted_registration(parts.fitted_points_m, surfaces, belief.depth_camera)
+        if moved is None:
+            return None
+        aligned = replace(
+            parts, judging_points_m=tuple(moved.apply(p) for p in parts.judging_points_m)
+        )
+        rival_m = _mean_distance_m(belief, aligned, before)
+        gain = evidence.before_m - evidence.after_m
+        if evidence.before_m - rival_m < self.rule.rival_share * gain:
+            return None
+        shift_mm = 1e3 * float(np.linalg.norm(moved.position_m))
+        return (
+            f"attachments do not explain this: a camera that stands {shift_mm:.1f} mm elsewhere "
+            f"brings points that were not fitted from {1e3 * evidence.before_m:.2f} to "
+            f"{1e3 * rival_m:.2f} mm, other attachments to {1e3 * evidence.after_m:.2f} mm"
+        )
 
 
 def _kept(
