@@ -34,7 +34,10 @@ class Part(BaseModel):
 
 
 class Tissue(Part):
-    """The slab, its material, and the finite-element mesh the twin uses for it."""
+    """The slab, its material, and the finite-element mesh the twin uses for it.
+
+    ``bed``: whether a rigid, frictionless bed lies right under it.
+    """
 
     length_x_m: Positive = 0.12
     width_y_m: Positive = 0.12
@@ -44,6 +47,7 @@ class Tissue(Part):
     material: MaterialName = "neo_hookean"
     element: ElementName = "hexahedron20"
     elements_xyz: tuple[int, int, int] = (8, 8, 1)
+    bed: bool = True
 
 
 class Attachments(Part):

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy import sparse
 
 from defras_sim.geometry import Floats
 from defras_sim.scene import MaterialName
-from defras_sim.tissue import materials
+from defras_sim.tissue import kernels, materials
 from defras_sim.tissue.elements import (
     Quadrature,
     quadrature,
@@ -57,7 +56,7 @@ class ElasticBody:
     def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
         """Elastic energy [J], infinite where the material cannot be; gradient (nodes, 3) [N]."""
         gradient = np.zeros_like(positions_m)
-        energy = _energy_and_gradient(
+        energy = kernels.energy_and_gradient(
             self._code,
             positions_m,
             self.mesh.connectivity,
@@ -72,7 +71,7 @@ class ElasticBody:
     def tangent_entries(self, positions_m: Floats) -> Floats:
         """Entries of the second derivative, in the order of :attr:`pattern` (CSC, symmetric)."""
         entries = np.zeros(self.pattern.nnz)
-        _tangent(
+        kernels.tangent(
             self._code,
             positions_m,
             self.mesh.connectivity,
@@ -86,7 +85,7 @@ class ElasticBody:
         return entries
 
     def largest_principal_stress(self, positions_m: Floats) -> PrincipalStress:
-        largest, element, point = _largest_principal_stress(
+        largest, element, point = kernels.largest_principal_stress(
             self._code,
             positions_m,
             self.mesh.connectivity,
@@ -132,118 +131,3 @@ def _pattern(connectivity: Integers, nodes: int) -> tuple[sparse.csc_array, NDAr
     start = graph.indptr[columns] * 9 + within * 3
     places = start[:, None] + per_column[:, None] * np.arange(3)
     return pattern, places.reshape(count, width, width, 3).astype(np.int32)
-
-
-_jit = njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
-
-
-@_jit
-def _deformation(gradient: Floats, local: Floats, F: Floats) -> None:
-    """F[i, J] = sum over nodes of local[i, a] gradient[J, a]."""
-    for i in range(3):
-        for j in range(3):
-            total = 0.0
-            for a in range(local.shape[1]):
-                total += local[i, a] * gradient[j, a]
-            F[i, j] = total
-
-
-@_jit
-def _energy_and_gradient(  # type: ignore[no-untyped-def]
-    code, positions, connectivity, gradients, volumes, mu, lam, out
-):
-    elements, points, _, width = gradients.shape
-    local = np.empty((3, width))
-    force = np.empty((3, width))
-    F = np.empty((3, 3))
-    P = np.empty((3, 3))
-    energy = 0.0
-    for e in range(elements):
-        for a in range(width):
-            for i in range(3):
-                local[i, a] = positions[connectivity[e, a], i]
-                force[i, a] = 0.0
-        for q in range(points):
-            slopes = gradients[e, q]
-            volume = volumes[e, q]
-            _deformation(slopes, local, F)
-            energy += volume * materials.stress(code, F, mu[e], lam[e], P)
-            for i in range(3):
-                x, y, z = volume * P[i, 0], volume * P[i, 1], volume * P[i, 2]
-                for a in range(width):
-                    force[i, a] += x * slopes[0, a] + y * slopes[1, a] + z * slopes[2, a]
-        for a in range(width):
-            for i in range(3):
-                out[connectivity[e, a], i] += force[i, a]
-    return energy
-
-
-@_jit
-def _tangent(  # type: ignore[no-untyped-def]
-    code, positions, connectivity, gradients, volumes, mu, lam, places, out
-):
-    elements, points, _, width = gradients.shape
-    local = np.empty((3, width))
-    block = np.empty((3, 3, width, width))
-    F = np.empty((3, 3))
-    A = np.empty((9, 9))
-    for e in range(elements):
-        for a in range(width):
-            for i in range(3):
-                local[i, a] = positions[connectivity[e, a], i]
-        block[:] = 0.0
-        for q in range(points):
-            slopes = gradients[e, q]
-            _deformation(slopes, local, F)
-            materials.tangent(code, F, mu[e], lam[e], A)
-            volume = volumes[e, q]
-            for i in range(3):
-                for k in range(i, 3):
-                    target = block[i, k]
-                    for a in range(width):
-                        x = y = z = 0.0
-                        for j in range(3):
-                            g = volume * slopes[j, a]
-                            x += g * A[3 * i + j, 3 * k]
-                            y += g * A[3 * i + j, 3 * k + 1]
-                            z += g * A[3 * i + j, 3 * k + 2]
-                        for b in range(width):
-                            target[a, b] += x * slopes[0, b] + y * slopes[1, b] + z * slopes[2, b]
-        for b in range(width):
-            for a in range(width):
-                for k in range(3):
-                    place = places[e, a, b, k]
-                    for i in range(3):
-                        if i <= k:
-                            out[place + i] += block[i, k, a, b]
-                        else:
-                            out[place + i] += block[k, i, b, a]
-
-
-@_jit
-def _largest_principal_stress(  # type: ignore[no-untyped-def]
-    code, positions, connectivity, gradients, mu, lam
-):
-    elements, points, _, width = gradients.shape
-    local = np.empty((3, width))
-    F = np.empty((3, 3))
-    P = np.empty((3, 3))
-    sigma = np.empty((3, 3))
-    V = np.empty((3, 3))
-    largest, at_element, at_point = -np.inf, 0, 0
-    for e in range(elements):
-        for a in range(width):
-            for i in range(3):
-                local[i, a] = positions[connectivity[e, a], i]
-        for q in range(points):
-            _deformation(gradients[e, q], local, F)
-            J = materials.cofactor(F, sigma)
-            materials.stress(code, F, mu[e], lam[e], P)
-            for i in range(3):
-                for j in range(3):
-                    sigma[i, j] = (P[i, 0] * F[j, 0] + P[i, 1] * F[j, 1] + P[i, 2] * F[j, 2]) / J
-            materials.jacobi_eigen(sigma, V)
-            value = max(sigma[0, 0], sigma[1, 1], sigma[2, 2])
-            if value > largest:
-                largest, at_element, at_point = value, e, q
-    return largest, at_element, at_point

@@ -15,10 +15,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from defras_sim.geometry import Floats
 from defras_sim.scene import MaterialName
+from defras_sim.tissue.matrices import cofactor, jit, rotation
 
 CODES: dict[MaterialName, int] = {"corotational": 0, "neo_hookean": 1, "stable_neo_hookean": 2}
 
@@ -39,25 +39,7 @@ def lame_parameters(
     return mu, lam
 
 
-_jit = njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
-
-
-@_jit
-def cofactor(F: Floats, out: Floats) -> float:
-    """Write the cofactor matrix J F^-T of ``F`` to ``out``; return J."""
-    out[0, 0] = F[1, 1] * F[2, 2] - F[1, 2] * F[2, 1]
-    out[0, 1] = F[1, 2] * F[2, 0] - F[1, 0] * F[2, 2]
-    out[0, 2] = F[1, 0] * F[2, 1] - F[1, 1] * F[2, 0]
-    out[1, 0] = F[2, 1] * F[0, 2] - F[2, 2] * F[0, 1]
-    out[1, 1] = F[2, 2] * F[0, 0] - F[2, 0] * F[0, 2]
-    out[1, 2] = F[2, 0] * F[0, 1] - F[2, 1] * F[0, 0]
-    out[2, 0] = F[0, 1] * F[1, 2] - F[0, 2] * F[1, 1]
-    out[2, 1] = F[0, 2] * F[1, 0] - F[0, 0] * F[1, 2]
-    out[2, 2] = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
-    return F[0, 0] * out[0, 0] + F[0, 1] * out[0, 1] + F[0, 2] * out[0, 2]
-
-
-@_jit
+@jit
 def stress(code: int, F: Floats, mu: float, lam: float, P: Floats) -> float:
     """Write the first Piola stress to ``P`` (3, 3); return the energy density [J/m^3]."""
     if code == 0:
@@ -97,7 +79,7 @@ def stress(code: int, F: Floats, mu: float, lam: float, P: Floats) -> float:
     return 0.5 * mu * (trace - 3) + volume - 0.5 * mu * math.log((trace + 1) / 4)
 
 
-@_jit
+@jit
 def tangent(code: int, F: Floats, mu: float, lam: float, A: Floats) -> None:
     """Write dP/dF to ``A`` (9, 9)."""
     B = np.empty((3, 3))
@@ -130,7 +112,7 @@ def tangent(code: int, F: Floats, mu: float, lam: float, A: Floats) -> None:
         _add_cofactor_derivative(F, lam * (J - alpha), A)
 
 
-@_jit
+@jit
 def _add_cofactor_derivative(F: Floats, scale: float, A: Floats) -> None:
     """Add ``scale`` d(cof F)/dF, written with permutation symbols so that J may be zero."""
     for i in range(3):
@@ -144,7 +126,7 @@ def _add_cofactor_derivative(F: Floats, scale: float, A: Floats) -> None:
             A[3 * i + j, 3 * n + m] -= scale * F[k, p]
 
 
-@_jit
+@jit
 def _corotational_tangent(F: Floats, mu: float, lam: float, A: Floats, R: Floats) -> None:
     """2 mu I + lambda R (x) R + (lambda tr(S - I) - 2 mu) dR/dF.
 
@@ -187,62 +169,3 @@ def _corotational_tangent(F: Floats, mu: float, lam: float, A: Floats, R: Floats
                     turn += W[p, a] * H[a, b] * W[q, b]
             A[p, q] = lam * R[p // 3, p % 3] * R[q // 3, q % 3] + factor * turn / determinant
         A[p, p] += 2 * mu
-
-
-@_jit
-def rotation(F: Floats, R: Floats) -> None:
-    """Write the rotation of F = R S to ``R``: a proper one even if F is inverted."""
-    C = np.empty((3, 3))
-    V = np.eye(3)
-    for i in range(3):
-        for j in range(3):
-            C[i, j] = F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]
-    jacobi_eigen(C, V)
-    # Columns F v are orthogonal; take the two longest and complete them right-handedly.
-    small = 0
-    for i in range(1, 3):
-        if C[i, i] < C[small, small]:
-            small = i
-    a, b = (small + 1) % 3, (small + 2) % 3
-    U = np.empty((3, 3))
-    for column in (a, b):
-        norm = 0.0
-        for i in range(3):
-            U[i, column] = F[i, 0] * V[0, column] + F[i, 1] * V[1, column] + F[i, 2] * V[2, column]
-            norm += U[i, column] ** 2
-        norm = math.sqrt(norm)
-        for i in range(3):
-            U[i, column] /= norm
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        U[i, small] = U[j, a] * U[k, b] - U[k, a] * U[j, b]
-    # V stays right-handed: it is a product of rotations.
-    for i in range(3):
-        for j in range(3):
-            R[i, j] = U[i, 0] * V[j, 0] + U[i, 1] * V[j, 1] + U[i, 2] * V[j, 2]
-
-
-@_jit
-def jacobi_eigen(C: Floats, V: Floats) -> None:
-    """Diagonalise symmetric ``C`` (3, 3) in place by Jacobi rotations, gathered in ``V``."""
-    for _ in range(12):
-        off = abs(C[0, 1]) + abs(C[0, 2]) + abs(C[1, 2])
-        if not off > 1e-15 * (abs(C[0, 0]) + abs(C[1, 1]) + abs(C[2, 2])):
-            return
-        for p in range(2):
-            for q in range(p + 1, 3):
-                if C[p, q] == 0.0:
-                    continue
-                theta = (C[q, q] - C[p, p]) / (2 * C[p, q])
-                t = (1.0 if theta >= 0 else -1.0) / (abs(theta) + math.sqrt(theta * theta + 1))
-                c = 1 / math.sqrt(t * t + 1)
-                s = t * c
-                for k in range(3):
-                    x, y = C[k, p], C[k, q]
-                    C[k, p], C[k, q] = c * x - s * y, s * x + c * y
-                for k in range(3):
-                    x, y = C[p, k], C[q, k]
-                    C[p, k], C[q, k] = c * x - s * y, s * x + c * y
-                for k in range(3):
-                    x, y = V[k, p], V[k, q]
-                    V[k, p], V[k, q] = c * x - s * y, s * x + c * y

@@ -17,8 +17,9 @@ from defras_sim.tissue.hole_response import HoleResponse
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import Integers, slab_mesh
 from defras_sim.tissue.path import Trail, between, length_m, markers_m
+from defras_sim.tissue.readout import tissue_state
 from defras_sim.tissue.solver import NewtonSettings, NewtonSolver, Solution
-from defras_sim.tissue.springs import ROWS, Springs, disc_rows, joined, net_force, net_moment
+from defras_sim.tissue.springs import ROWS, Springs, disc_rows, joined, slopes_by_stiffness
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.surface import surface_map
 
@@ -29,6 +30,7 @@ MAX_TIP_STEP_M = 0.004
 # Of Newton's method, beside those for each such step: a solve that fails should fail soon.
 SPARE_ITERATIONS = 80
 ITERATIONS_PER_STEP = 10
+MAX_ITERATIONS = 500
 
 
 @dataclass(frozen=True)
@@ -140,8 +142,11 @@ class TissueModel:
 
     def restore(self, snapshot: TissueSnapshot) -> None:
         """Go back to ``snapshot``; the holes keep their present stiffness."""
+        others = _springs(snapshot.grasps) != _springs(self._grasps)
+        self._grasps = dict(snapshot.grasps)
+        if others:
+            self._changed()
         self._place(snapshot)
-        self._changed()
 
     def solve(self, tips: Mapping[str, Pose]) -> TissueState:
         """Equilibrium with each holding arm's tip at its pose in ``tips`` (tissue_from_tip).
@@ -171,15 +176,10 @@ class TissueModel:
         At an equilibrium the gradient g(x, k) stays zero, so dx/dk = -K^-1 dg/dk.
         """
         x = self._positions_m
-        stretch = self._hole_rows @ x - self._hole_targets_m
-        columns = np.zeros((x.size, len(holes)))
-        for column, hole in enumerate(np.asarray(holes, dtype=np.int64)):
-            rows = slice(ROWS * hole, ROWS * (hole + 1))
-            columns[:, column] = (self._hole_rows[rows].T @ stretch[rows]).ravel()
-        change = -self._solver.solve_tangent(self._energy.tangent(x), columns)
-        by_node = change.reshape(len(x), 3 * len(holes))
-        surface = self._surface.from_nodes @ by_node
-        return surface.reshape(-1, 3, len(holes))
+        slopes = slopes_by_stiffness(self._hole_rows, self._hole_targets_m, x, holes)
+        change = -self._solver.solve_tangent(self._energy.tangent(x), slopes)
+        by_node = change.reshape(len(x), -1)
+        return (self._surface.from_nodes @ by_node).reshape(-1, 3, len(holes))
 
     def response_to_hole_forces(self, holes: Integers) -> HoleResponse:
         """Linear response of the surface and of ``holes`` to forces where ``holes`` hold."""
@@ -228,7 +228,8 @@ class TissueModel:
         steps = max(1.0, np.ceil(way / MAX_TIP_STEP_M))
         step = 1.0 / steps
         smallest = step / 16 if way > 0 else step
-        share, iterations, most = 0.0, 0, SPARE_ITERATIONS + ITERATIONS_PER_STEP * steps
+        most = min(MAX_ITERATIONS, SPARE_ITERATIONS + ITERATIONS_PER_STEP * steps)
+        share, iterations = 0.0, 0
         while share < 1.0 and step >= smallest and iterations <= most:
             aim = min(1.0, share + step)
             solution = self._step_to(
@@ -272,29 +273,8 @@ class TissueModel:
                 raise ValueError(f"the pose of {arm} is not finite: {pose}")
 
     def _state(self, converged: bool, iterations: int) -> TissueState:
-        x = self._positions_m
-        springs, targets = self._energy.springs, self._energy.targets_m
-        forces = springs.forces(x, targets)
-        held = springs.rows @ x
-        holes = len(self._hole_stiffness) * ROWS
-        grasp_forces, grasp_moments = {}, {}
-        for number, (arm, grasp) in enumerate(self._grasps.items()):
-            mine = slice(holes + number * ROWS, holes + (number + 1) * ROWS)
-            tip_m = grasp.tissue_from_tip.position_m
-            grasp_forces[arm] = net_force(forces[mine])[0]
-            grasp_moments[arm] = net_moment(forces[mine], held[mine], tip_m)[0]
-        peak = self._body.largest_principal_stress(x)
-        return TissueState(
-            nodes_m=x.copy(),
-            surface=self._surface.surface(x),
-            grasp_forces_n=grasp_forces,
-            grasp_moments_nm=grasp_moments,
-            attachment_forces_n=net_force(forces[:holes]),
-            largest_principal_stress_pa=peak.largest_pa,
-            stress_at_m=peak.position_m,
-            strain_energy_j=self._body.energy_and_gradient(x)[0],
-            converged=converged,
-            iterations=iterations,
+        return tissue_state(
+            self._energy, self._positions_m, self._grasps, self._surface, converged, iterations
         )
 
 
@@ -304,3 +284,8 @@ def _at_rest(grasps: Mapping[str, Grasp]) -> dict[str, Grasp]:
         arm: replace(grasp, tissue_from_tip=grasp.tissue_from_rest_tip)
         for arm, grasp in grasps.items()
     }
+
+
+def _springs(grasps: Mapping[str, Grasp]) -> list[tuple[str, int]]:
+    """Which springs hold, in which order: equal if the same energy describes them."""
+    return [(arm, id(grasp.springs)) for arm, grasp in grasps.items()]

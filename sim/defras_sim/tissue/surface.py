@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from defras_sim.geometry import Floats
@@ -25,7 +26,7 @@ class SurfaceMap:
 
     from_nodes: sparse.csr_array
     triangles: Integers
-    upper: np.ndarray
+    upper: NDArray[np.bool_]
     rest_xy_m: Floats
 
     def surface(self, positions_m: Floats) -> Surface:

@@ -3,17 +3,22 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from defras_sim.geometry import Pose
-from defras_sim.scene import RIGID_HOLE_N_PER_M, Attachments, Roi, Scene
+from defras_sim.scene import RIGID_HOLE_N_PER_M, Attachments, Roi, Scene, Tissue
 from defras_sim.tissue.grasp import NothingToGrasp
 from defras_sim.tissue.model import TissueModel
 from defras_sim.tissue.springs import net_moment
 
 
 def side_scene(columns: int = 2) -> Scene:
-    """The outer ``columns`` of holes at the smallest x hold."""
+    """The outer ``columns`` of holes at the smallest x hold; no bed shares the load."""
     row = "#" * columns + "." * (12 - columns)
     roi = Roi(center_x_m=0.0, center_y_m=0.0)
-    return Scene(name="side", attachments=Attachments(map=(row,) * 12), roi=roi)
+    return Scene(
+        name="side",
+        attachments=Attachments(map=(row,) * 12),
+        roi=roi,
+        tissue=Tissue(bed=False),
+    )
 
 
 def at(x: float, y: float, z: float, turn=(0.0, 0.0, 0.0)) -> Pose:

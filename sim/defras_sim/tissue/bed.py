@@ -1,0 +1,52 @@
+"""The bed under the tissue: rigid, frictionless, and only ever pushing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from defras_sim.geometry import Floats
+from defras_sim.scene import Tissue
+from defras_sim.tissue.mesh import Mesh
+
+# Pressure per depth. A retraction presses with a few hundred pascal at most, which then costs a
+# few tenths of a millimetre.
+STIFFNESS_PA_PER_M = 8e6
+# The resting tissue does not touch: contact that flickers on and off would slow every solve.
+CLEARANCE_M = 5e-5
+
+
+@dataclass(frozen=True)
+class Bed:
+    """A unilateral penalty on the depth of the nodes below ``height_m``.
+
+    ``stiffness_n_per_m`` (nodes,) is each node's share of the pressure.
+    """
+
+    height_m: float
+    stiffness_n_per_m: Floats
+
+    def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
+        """Energy [J] and its gradient (nodes, 3) [N]; zero above the bed."""
+        depth_m = self._depth_m(positions_m)
+        force_n = self.stiffness_n_per_m * depth_m
+        gradient = np.zeros_like(positions_m)
+        gradient[:, 2] = -force_n
+        return 0.5 * float(force_n @ depth_m), gradient
+
+    def tangent_diagonal(self, positions_m: Floats) -> Floats:
+        """Diagonal (3 nodes,) of the second derivative [N/m]; the rest of it is zero."""
+        diagonal = np.zeros_like(positions_m)
+        diagonal[:, 2] = np.where(self._depth_m(positions_m) > 0, self.stiffness_n_per_m, 0.0)
+        return diagonal.ravel()
+
+    def _depth_m(self, positions_m: Floats) -> Floats:
+        return np.maximum(0.0, self.height_m - positions_m[:, 2])
+
+
+def bed_under(mesh: Mesh, tissue: Tissue) -> Bed:
+    """The bed on which the slab lies. Nodes of both faces feel it: folded tissue turns over."""
+    lower = int(np.sum(mesh.nodes_m[:, 2] < -tissue.thickness_m * (1 - 1e-9)))
+    share = STIFFNESS_PA_PER_M * tissue.length_x_m * tissue.width_y_m / lower
+    return Bed(-tissue.thickness_m - CLEARANCE_M, np.full(len(mesh.nodes_m), share))

@@ -1,0 +1,153 @@
+"""Loops over elements and quadrature points, compiled.
+
+``gradients`` (elements, points, 3, nodes of an element) are rest gradients of shape functions,
+``volumes`` (elements, points) rest volumes, ``mu`` and ``lam`` (elements,) the material's own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defras_sim.geometry import Floats
+from defras_sim.tissue import materials
+from defras_sim.tissue.matrices import cofactor, jacobi_eigen, jit
+from defras_sim.tissue.mesh import Integers
+
+
+@jit
+def _deformation(gradient: Floats, local: Floats, F: Floats) -> None:
+    """F[i, J] = sum over nodes of local[i, a] gradient[J, a]."""
+    for i in range(3):
+        for j in range(3):
+            total = 0.0
+            for a in range(local.shape[1]):
+                total += local[i, a] * gradient[j, a]
+            F[i, j] = total
+
+
+@jit
+def energy_and_gradient(
+    code: int,
+    positions: Floats,
+    connectivity: Integers,
+    gradients: Floats,
+    volumes: Floats,
+    mu: Floats,
+    lam: Floats,
+    out: Floats,
+) -> float:
+    """Add the gradient to ``out`` (nodes, 3); return the energy."""
+    elements, points, _, width = gradients.shape
+    local = np.empty((3, width))
+    force = np.empty((3, width))
+    F = np.empty((3, 3))
+    P = np.empty((3, 3))
+    energy = 0.0
+    for e in range(elements):
+        for a in range(width):
+            for i in range(3):
+                local[i, a] = positions[connectivity[e, a], i]
+                force[i, a] = 0.0
+        for q in range(points):
+            slopes = gradients[e, q]
+            volume = volumes[e, q]
+            _deformation(slopes, local, F)
+            energy += volume * materials.stress(code, F, mu[e], lam[e], P)
+            for i in range(3):
+                x, y, z = volume * P[i, 0], volume * P[i, 1], volume * P[i, 2]
+                for a in range(width):
+                    force[i, a] += x * slopes[0, a] + y * slopes[1, a] + z * slopes[2, a]
+        for a in range(width):
+            for i in range(3):
+                out[connectivity[e, a], i] += force[i, a]
+    return energy
+
+
+@jit
+def tangent(
+    code: int,
+    positions: Floats,
+    connectivity: Integers,
+    gradients: Floats,
+    volumes: Floats,
+    mu: Floats,
+    lam: Floats,
+    places: NDArray[np.int32],
+    out: Floats,
+) -> None:
+    """Add the second derivative to the matrix entries ``out``.
+
+    ``places`` (elements, a, b, 3): entry of row 3 a in column 3 b + k, before the next two rows.
+    """
+    elements, points, _, width = gradients.shape
+    local = np.empty((3, width))
+    block = np.empty((3, 3, width, width))
+    F = np.empty((3, 3))
+    A = np.empty((9, 9))
+    for e in range(elements):
+        for a in range(width):
+            for i in range(3):
+                local[i, a] = positions[connectivity[e, a], i]
+        block[:] = 0.0
+        for q in range(points):
+            slopes = gradients[e, q]
+            _deformation(slopes, local, F)
+            materials.tangent(code, F, mu[e], lam[e], A)
+            volume = volumes[e, q]
+            for i in range(3):
+                for k in range(i, 3):
+                    target = block[i, k]
+                    for a in range(width):
+                        x = y = z = 0.0
+                        for j in range(3):
+                            g = volume * slopes[j, a]
+                            x += g * A[3 * i + j, 3 * k]
+                            y += g * A[3 * i + j, 3 * k + 1]
+                            z += g * A[3 * i + j, 3 * k + 2]
+                        for b in range(width):
+                            target[a, b] += x * slopes[0, b] + y * slopes[1, b] + z * slopes[2, b]
+        for b in range(width):
+            for a in range(width):
+                for k in range(3):
+                    place = places[e, a, b, k]
+                    for i in range(3):
+                        if i <= k:
+                            out[place + i] += block[i, k, a, b]
+                        else:
+                            out[place + i] += block[k, i, b, a]
+
+
+@jit
+def largest_principal_stress(
+    code: int,
+    positions: Floats,
+    connectivity: Integers,
+    gradients: Floats,
+    mu: Floats,
+    lam: Floats,
+) -> tuple[float, int, int]:
+    """Largest principal Cauchy stress, and the element and quadrature point where it acts."""
+    elements, points, _, width = gradients.shape
+    local = np.empty((3, width))
+    F = np.empty((3, 3))
+    P = np.empty((3, 3))
+    sigma = np.empty((3, 3))
+    V = np.empty((3, 3))
+    largest, at_element, at_point = -np.inf, 0, 0
+    for e in range(elements):
+        for a in range(width):
+            for i in range(3):
+                local[i, a] = positions[connectivity[e, a], i]
+        for q in range(points):
+            _deformation(gradients[e, q], local, F)
+            J = cofactor(F, sigma)
+            materials.stress(code, F, mu[e], lam[e], P)
+            for i in range(3):
+                for j in range(3):
+                    sigma[i, j] = (P[i, 0] * F[j, 0] + P[i, 1] * F[j, 1] + P[i, 2] * F[j, 2]) / J
+            jacobi_eigen(sigma, V)
+            value = max(sigma[0, 0], sigma[1, 1], sigma[2, 2])
+            if value > largest:
+                largest, at_element, at_point = value, e, q
+    return largest, at_element, at_point
