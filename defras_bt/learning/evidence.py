@@ -42,6 +42,11 @@ def compare(
     Residuals of neighbouring points, and of one place in different frames, are alike. So points are
     gathered into 20 mm squares of the resting tissue, over all frames, and it is the squares that
     vote: a paired permutation test flips the sign of whole squares (Fisher 1935).
+
+    Measured on smooth random differences at a level of 1 %: a test over points is fooled in 33 to
+    44 % of cases, this one in 7 % where they are correlated over 10 mm, and in 14 % over 20 mm.
+    Larger squares are fooled less but too few of them see a small patch. So ``chance`` is not
+    enough to go by: whoever adopts anything has to ask for a practical gain as well.
     """
     block = np.floor(rest_xy_m / BLOCK_M).astype(np.int64)
     _, member = np.unique(block, axis=0, return_inverse=True)
