@@ -170,7 +170,8 @@ class TestEnds:
         assert "time is over" in stage.board.outcome_reason
         last = stage.notes.records[-1]
         assert last.time_s == pytest.approx(1.0)
-        assert last.sent == HOLD
+        assert last.proposed.arms, "the reach was still under way"
+        assert last.sent == stage.bench.world.sent[-1] == HOLD
         assert stage.notes.told("end") == ["Stopped after 1 s without the goal."]
 
     def test_a_goal_in_the_last_tick_counts(self):

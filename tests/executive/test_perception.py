@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from defras_bt.executive.blackboard import LearningAttempt
 from defras_bt.executive.perception import Perception
 from defras_sim.worlds.protocol import JAW_CLOSED_RAD, JAW_OPEN_RAD, ArmCommand, Command
 from tests.nodes.bench import EPSILON_N, Bench
@@ -146,6 +147,7 @@ class TestGrips:
         senses.grasp()
         bench = senses.bench
         bench.board.unexplained = True
+        bench.board.last_learning = LearningAttempt(0, 2, {})
         senses.turn_jaw(JAW_OPEN_RAD)
         assert bench.board.grips == {}
         assert bench.board.at == {}

@@ -34,7 +34,9 @@ class ManoeuvreChecks:
         end_m = self.target_m(bench, start_m)
         way = (end_m - start_m) / np.linalg.norm(end_m - start_m)
         limit = bench.scene.motion.tissue_speed_m_s
+        start_s = bench.world.time_s
         while bench.tick(node) == Status.RUNNING and node.code == "moving":
+            assert bench.world.time_s - start_s < 10.0, "never arrives"
             velocity = bench.commanded_m_s()
             assert np.linalg.norm(velocity) <= limit + 1e-12
             np.testing.assert_allclose(velocity / np.linalg.norm(velocity), way, atol=1e-6)
