@@ -48,9 +48,9 @@ class ColourCalibration:
     Whatever has neither colour (instruments, bed, background) is left out of both.
     """
 
-    tissue: HsvRange = HsvRange(hue=(0.92, 0.12), saturation=(0.25, 1.0), value=(0.12, 1.0))
+    tissue: HsvRange = HsvRange(hue=(0.92, 0.12), saturation=(0.15, 1.0), value=(0.12, 1.0))
     roi: HsvRange = HsvRange(hue=(0.25, 0.45), saturation=(0.35, 1.0), value=(0.12, 1.0))
 
 
 DEFAULT_COLOURS = ColourCalibration()
-"""Fits the simulated cameras: reddish tissue over a green region of interest."""
+"""Fits the simulated cameras (``defras_sim.worlds.colours``): reddish tissue, green region."""

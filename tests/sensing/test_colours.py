@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from defras_bt.sensing.colours import DEFAULT_COLOURS, HsvRange
+from defras_sim.worlds import colours
 
 
 def pixel(*rgb: int) -> np.ndarray:
@@ -21,15 +22,17 @@ def test_a_range_through_red_wraps_around() -> None:
 
 
 @pytest.mark.parametrize("light", [1.0, 0.7, 0.4, 0.2])
-def test_the_default_colours_hold_in_any_light(light: float) -> None:
-    def lit(*rgb: int) -> np.ndarray:
-        return (np.array([[rgb]]) * light).astype(np.uint8)
-
-    assert DEFAULT_COLOURS.tissue.mask(lit(200, 90, 80)).item()
-    assert not DEFAULT_COLOURS.roi.mask(lit(200, 90, 80)).item()
-    assert DEFAULT_COLOURS.roi.mask(lit(40, 200, 60)).item()
-    assert not DEFAULT_COLOURS.tissue.mask(lit(40, 200, 60)).item()
-    assert not DEFAULT_COLOURS.tissue.mask(lit(150, 150, 155)).item()
+def test_the_default_colours_tell_the_simulated_ones_apart_in_any_light(light: float) -> None:
+    tissue, roi = DEFAULT_COLOURS.tissue, DEFAULT_COLOURS.roi
+    for colour, is_tissue, is_roi in (
+        (colours.TISSUE, True, False),
+        (colours.ROI, False, True),
+        (colours.BED, False, False),
+        ((0.6, 0.6, 0.62), False, False),
+    ):
+        lit = pixel(*(int(255 * light * channel) for channel in colour))
+        assert tissue.mask(lit).item() == is_tissue
+        assert roi.mask(lit).item() == is_roi
 
 
 def test_an_impossible_range_is_refused() -> None:
