@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
+from scipy.spatial.transform import Rotation
 
 from defras_sim.geometry import Floats, Pose
 from defras_sim.surface import Surface
-from defras_sim.tissue.mesh import Mesh
-from defras_sim.tissue.springs import ROW_SHIFTS, ROWS, Springs, disc_rows
+from defras_sim.tissue.mesh import Integers, Mesh
+from defras_sim.tissue.springs import ROW_SHIFTS, Springs, disc_rows
 
 # Stiff enough that a patch under 1 N gives 0.1 mm, soft enough not to spoil the conditioning.
 GRASP_N_PER_M = 1e4
@@ -22,12 +24,15 @@ class NothingToGrasp(ValueError):
 
 @dataclass(frozen=True)
 class Grasp:
-    """A held patch: its springs, and their targets (3, 3) as seen from the tip.
+    """A held patch: its springs, and their targets (rows, 3) as seen from the tip.
 
-    ``tissue_from_rest_tip`` is where the tip would hold the patch without deforming the tissue.
+    ``shifts`` (rows,) says how each held quantity moves with a translation: 1 for positions, 0 for
+    moments. ``tissue_from_rest_tip`` is where the tip would hold the patch without deforming the
+    tissue.
     """
 
     springs: Springs
+    shifts: Floats
     tip_targets_m: Floats
     tissue_from_tip: Pose
     tissue_from_rest_tip: Pose
@@ -35,24 +40,66 @@ class Grasp:
     @property
     def targets_m(self) -> Floats:
         pose = self.tissue_from_tip
-        return self.tip_targets_m @ pose.rotation.T + ROW_SHIFTS[:, None] * pose.position_m
+        return self.tip_targets_m @ pose.rotation.T + self.shifts[:, None] * pose.position_m
+
+    @property
+    def rows(self) -> int:
+        return len(self.shifts)
+
+    def force_n(self, forces_n: Floats) -> Floats:
+        """Net force (3,) on the tissue of the springs' forces (rows, 3)."""
+        return self.shifts @ forces_n
+
+    def moment_nm(self, forces_n: Floats, held_m: Floats) -> Floats:
+        """Their moment (3,) about the tip, where the held quantities are ``held_m`` (rows, 3)."""
+        levers = held_m - self.shifts[:, None] * self.tissue_from_tip.position_m
+        return np.cross(levers, forces_n).sum(axis=0)
 
 
-def grasped_disc(
+def grasped_patch(
     mesh: Mesh, positions_m: Floats, center_xy_m: Floats, radius_m: float, tissue_from_tip: Pose
 ) -> Grasp:
     """Hold the disc around rest position ``center_xy_m`` (2,) of the upper face as it lies now.
 
-    The disc is moved inwards where it would reach over the slab's edge.
+    The disc is moved inwards where it would reach over the slab's edge. Linear tetrahedra are held
+    by whole nodes instead, as PyBullet holds them.
     """
-    half = np.ptp(mesh.nodes_m, axis=0)[:2] / 2
-    center = np.clip(center_xy_m, radius_m - half, half - radius_m)
-    rows = disc_rows(mesh, center[None], radius_m, 0.0)
+    if mesh.element == "tetrahedron4":
+        nodes = nodes_under_jaw(mesh, center_xy_m, radius_m)
+        rows = sparse.csr_array(sparse.eye_array(len(mesh.nodes_m), format="csr")[nodes])
+        shifts = np.ones(len(nodes))
+        motion = _nearest_motion(mesh.nodes_m[nodes], positions_m[nodes])
+    else:
+        half = np.ptp(mesh.nodes_m, axis=0)[:2] / 2
+        center = np.clip(center_xy_m, radius_m - half, half - radius_m)
+        rows, shifts = disc_rows(mesh, center[None], radius_m, 0.0), ROW_SHIFTS
+        motion = _patch_motion(np.asarray(rows @ mesh.nodes_m), np.asarray(rows @ positions_m))
     held = rows @ positions_m
-    from_tip = held - ROW_SHIFTS[:, None] * tissue_from_tip.position_m
-    rest_tip = _patch_motion(rows @ mesh.nodes_m, held).inverse() @ tissue_from_tip
-    springs = Springs(rows, np.full(ROWS, GRASP_N_PER_M))
-    return Grasp(springs, from_tip @ tissue_from_tip.rotation, tissue_from_tip, rest_tip)
+    from_tip = held - shifts[:, None] * tissue_from_tip.position_m
+    springs = Springs(rows, np.full(len(shifts), GRASP_N_PER_M))
+    return Grasp(
+        springs,
+        shifts,
+        from_tip @ tissue_from_tip.rotation,
+        tissue_from_tip,
+        motion.inverse() @ tissue_from_tip,
+    )
+
+
+def nodes_under_jaw(mesh: Mesh, center_xy_m: Floats, radius_m: float) -> Integers:
+    """Nodes of both faces within the jaw's radius and half a cell of rest position (2,).
+
+    Half a cell more than the radius always gives enough columns of nodes to hold an orientation.
+    """
+    away_m = np.linalg.norm(mesh.nodes_m[:, :2] - center_xy_m, axis=1)
+    return np.flatnonzero(away_m <= radius_m + float(np.max(mesh.cell_m[:2])) / 2 + 1e-6)
+
+
+def _nearest_motion(rest_m: Floats, now_m: Floats) -> Pose:
+    """Rigid motion that brings ``rest_m`` (n, 3) nearest to ``now_m`` (n, 3)."""
+    rest_mean, now_mean = rest_m.mean(axis=0), now_m.mean(axis=0)
+    rotation = Rotation.align_vectors(now_m - now_mean, rest_m - rest_mean)[0].as_matrix()
+    return Pose(now_mean - rotation @ rest_mean, rotation)
 
 
 def _patch_motion(rest_m: Floats, now_m: Floats) -> Pose:

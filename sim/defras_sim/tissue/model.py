@@ -12,7 +12,7 @@ from defras_sim.scene import RIGID_HOLE_N_PER_M, ElementName, MaterialName, Scen
 from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.bed import bed_under
 from defras_sim.tissue.equilibrium import PotentialEnergy
-from defras_sim.tissue.grasp import Grasp, NothingToGrasp, grasped_disc, nearest_on_upper_face
+from defras_sim.tissue.grasp import Grasp, NothingToGrasp, grasped_patch, nearest_on_upper_face
 from defras_sim.tissue.hole_response import HoleResponse
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import Integers, slab_mesh
@@ -114,7 +114,7 @@ class TissueModel:
             self.mesh, self._positions_m, surface, tissue_from_tip.position_m
         )
         radius = self.scene.grasp.patch_radius_m
-        self._grasps[arm] = grasped_disc(
+        self._grasps[arm] = grasped_patch(
             self.mesh, self._positions_m, center, radius, tissue_from_tip
         )
         self._changed()

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from defras_sim.geometry import Floats
 from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.grasp import Grasp
-from defras_sim.tissue.springs import ROWS, net_force, net_moment
+from defras_sim.tissue.springs import net_force
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.surface import SurfaceMap
 
@@ -27,13 +27,13 @@ def tissue_state(
     springs = energy.springs
     forces = springs.forces(positions_m, energy.targets_m)
     held = springs.rows @ positions_m
-    holes = len(forces) - ROWS * len(grasps)
-    grasp_forces, grasp_moments = {}, {}
-    for number, (arm, grasp) in enumerate(grasps.items()):
-        mine = slice(holes + number * ROWS, holes + (number + 1) * ROWS)
-        tip_m = grasp.tissue_from_tip.position_m
-        grasp_forces[arm] = net_force(forces[mine])[0]
-        grasp_moments[arm] = net_moment(forces[mine], held[mine], tip_m)[0]
+    holes = len(forces) - sum(grasp.rows for grasp in grasps.values())
+    grasp_forces, grasp_moments, first = {}, {}, holes
+    for arm, grasp in grasps.items():
+        mine = slice(first, first + grasp.rows)
+        grasp_forces[arm] = grasp.force_n(forces[mine])
+        grasp_moments[arm] = grasp.moment_nm(forces[mine], held[mine])
+        first += grasp.rows
     peak = energy.body.largest_principal_stress(positions_m)
     return TissueState(
         nodes_m=positions_m.copy(),

@@ -81,12 +81,6 @@ def net_force(forces_n: Floats) -> Floats:
     return forces_n.reshape(-1, ROWS, 3)[:, 0]
 
 
-def net_moment(forces_n: Floats, held_m: Floats, about_m: Floats) -> Floats:
-    """Moment (discs, 3) [Nm] about a point, with the held quantities ``held_m`` (3 discs, 3)."""
-    levers = held_m.reshape(-1, ROWS, 3) - ROW_SHIFTS[:, None] * about_m
-    return np.cross(levers, forces_n.reshape(-1, ROWS, 3)).sum(axis=1)
-
-
 def joined(parts: list[Springs]) -> Springs:
     """All springs as one set, in order."""
     return Springs(

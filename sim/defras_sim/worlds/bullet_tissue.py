@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
+from defras_sim.tissue.grasp import nodes_under_jaw
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import slab_mesh
 from defras_sim.tissue.surface import surface_map
 from defras_sim.worlds.colours import TISSUE
 
 DENSITY_KG_M3 = 1000.0
-_MARGIN_M = 0.001
+CONTACT_MARGIN_M = 0.001
 _ROUNDING_M = 1e-6
 
 
 class BulletTissue:
-    """Linear tetrahedra with PyBullet's neo-Hookean law, without gravity and without a bed.
+    """Linear tetrahedra with PyBullet's neo-Hookean law, without gravity.
 
-    Without gravity nothing presses the tissue down, and with it the slab alone would weigh more
-    than twice the force threshold; so the bed is only drawn.
+    With gravity the slab alone would weigh more than twice the paper's force threshold.
     """
 
     def __init__(self, client: Any, scene: Scene) -> None:
@@ -35,7 +35,8 @@ class BulletTissue:
         mesh = slab_mesh(scene.tissue, "tetrahedron4", scene.simulation.bullet_elements_xyz)
         self._rest_m = mesh.nodes_m
         self._surface = surface_map(mesh, scene.tissue)
-        self._half_cell_m = np.array(mesh.cell_m)[:2] / 2
+        self._mesh = mesh
+        self._jaw_radius_m = scene.grasp.patch_radius_m
         self._thickness_m = scene.tissue.thickness_m
         self.body = self._load(scene, mesh.connectivity)
         for node in self._held_nodes(scene):
@@ -64,16 +65,11 @@ class BulletTissue:
             self._client.removeConstraint(anchor)
 
     def patch_at(self, point_m: Floats) -> NDArray[np.int64]:
-        """Nodes of both faces that a jaw at ``point_m`` (3,) takes.
-
-        The jaw's patch is a disc of half a cell: it holds the material column under it, that is
-        the nodes that span it there. This is what the twin's disc does on the same mesh.
-        """
+        """Nodes that a jaw at ``point_m`` (3,) takes: those the twin holds on the same mesh."""
         surface = self.surface()
         upper = np.flatnonzero(surface.upper)
         nearest = upper[np.argmin(np.linalg.norm(surface.vertices_m[upper] - point_m, axis=1))]
-        away_m = np.abs(self._rest_m[:, :2] - surface.rest_xy_m[nearest])
-        return np.flatnonzero(np.all(away_m <= self._half_cell_m + _ROUNDING_M, axis=1))
+        return nodes_under_jaw(self._mesh, surface.rest_xy_m[nearest], self._jaw_radius_m)
 
     def _held_nodes(self, scene: Scene) -> NDArray[np.int64]:
         """Nodes of the lower face at the corners of each holding hole's cell."""
@@ -101,7 +97,7 @@ class BulletTissue:
                 NeoHookeanLambda=lam,
                 NeoHookeanDamping=scene.simulation.bullet_damping,
                 useSelfCollision=0,
-                collisionMargin=_MARGIN_M,
+                collisionMargin=CONTACT_MARGIN_M,
             )
         flags = self._client.VISUAL_SHAPE_DOUBLE_SIDED
         self._client.changeVisualShape(body, -1, rgbaColor=[*TISSUE, 1], flags=flags)

@@ -12,12 +12,11 @@ import numpy as np
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
 from defras_sim.worlds.bullet_arm import BulletArm
 from defras_sim.worlds.bullet_camera import take_picture
-from defras_sim.worlds.bullet_tissue import BulletTissue
+from defras_sim.worlds.bullet_tissue import CONTACT_MARGIN_M, BulletTissue
 from defras_sim.worlds.colours import BED, ROI
 from defras_sim.worlds.error import WorldError
 from defras_sim.worlds.jaw_contact import distance_to_upper_m
@@ -26,6 +25,7 @@ from defras_sim.worlds.protocol import (
     HOLD,
     JAW_OPEN_RAD,
     ArmCommand,
+    ArmObservation,
     Command,
     Observation,
 )
@@ -33,6 +33,7 @@ from defras_sim.worlds.protocol import (
 GRASP_REACH_M = 0.004
 _ROI_DISC_M = 0.0002
 _BED_HALF_M = 0.25
+_BED_HALF_THICKNESS_M = 0.02
 _EXPLODED_M = 1.0
 
 
@@ -53,7 +54,7 @@ class BulletWorld:
         self._client.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
         self._client.setGravity(0, 0, 0)
         self._client.setTimeStep(scene.tick_s / self._steps)
-        self._draw_bed()
+        self._lay_bed()
         self._tissue = BulletTissue(self._client, scene)
         self._arms = {
             name: BulletArm(self._client, name, np.array(arm.rcm_m), np.array(arm.home_tip_m))
@@ -139,7 +140,9 @@ class BulletWorld:
     def _sense(self) -> None:
         """Read every sensor that is due; the others keep their last reading."""
         scene, time_s = self._scene, self.time_s
-        arms = {name: arm.observe(time_s) for name, arm in self._arms.items()}
+        arms: dict[str, ArmObservation] = {
+            name: arm.observe(time_s) for name, arm in self._arms.items()
+        }
         update = replace(self._latest, time_s=time_s, arms=arms)
         if self._due(scene.depth_camera.period_s):
             picture = take_picture(self._client, scene.depth_camera, time_s, self._rng)
@@ -156,18 +159,21 @@ class BulletWorld:
         periods = np.floor(np.array([self._ticks - 1, self._ticks]) * self.tick_s / period_s + 1e-6)
         return bool(periods[1] > periods[0])
 
-    def _draw_bed(self) -> None:
-        """The bed and the region on it: seen, never felt."""
-        client, center_m = self._client, self._scene.roi_center_m
-        bed = client.createVisualShape(
-            client.GEOM_BOX, halfExtents=[_BED_HALF_M, _BED_HALF_M, 0.001], rgbaColor=[*BED, 1]
-        )
+    def _lay_bed(self) -> None:
+        """The bed, which tissue cannot pass, and the region on it, which is only seen."""
+        client, scene = self._client, self._scene
+        size = [_BED_HALF_M, _BED_HALF_M, _BED_HALF_THICKNESS_M]
+        # PyBullet keeps soft bodies a margin away from what they touch: the bed that is felt lies
+        # that much lower than the bed that is meant.
+        felt_m = -scene.tissue.thickness_m - CONTACT_MARGIN_M - _BED_HALF_THICKNESS_M
+        shape = client.createCollisionShape(client.GEOM_BOX, halfExtents=size)
+        drawn = client.createVisualShape(client.GEOM_BOX, halfExtents=size, rgbaColor=[*BED, 1])
+        bed = client.createMultiBody(0, shape, drawn, [0, 0, felt_m])
+        client.changeDynamics(bed, -1, lateralFriction=0.0)
         region = client.createVisualShape(
             client.GEOM_CYLINDER,
-            radius=self._scene.roi.radius_m,
+            radius=scene.roi.radius_m,
             length=_ROI_DISC_M,
             rgbaColor=[*ROI, 1],
         )
-        below_m: Floats = np.array([0.0, 0.0, center_m[2] - 0.001 - _ROI_DISC_M])
-        client.createMultiBody(0, -1, bed, list(below_m))
-        client.createMultiBody(0, -1, region, list(center_m))
+        client.createMultiBody(0, -1, region, list(scene.roi_center_m))
