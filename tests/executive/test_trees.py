@@ -43,6 +43,13 @@ def monitored(request) -> Stage:
     return on_stage(request.param)
 
 
+@pytest.mark.parametrize(
+    ("tree", "metric"), [("defras", "local"), ("defras_paper", "median"), ("fras", None)]
+)
+def test_each_tree_listens_to_its_own_metric(tree, metric):
+    assert on_stage(tree).board.metric == metric
+
+
 def actions(stage: Stage) -> list[str]:
     return [
         event.data["action"]

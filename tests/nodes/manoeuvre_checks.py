@@ -54,6 +54,19 @@ class ManoeuvreChecks:
         assert settled_s == pytest.approx(SETTLE_S, abs=bench.scene.tick_s + 1e-9)
         assert all(not command.arms for command in bench.world.sent)
 
+    def test_pushed_away_while_it_settles_it_returns_and_settles_anew(self, bench, start_m, node):
+        end_m = np.asarray(self.target_m(bench, start_m), float)
+        bench.board.grips["psm1"].starts_m[self.leaf.spoken] = start_m
+        codes = []
+        for offset_m in (0.0, 0.0, 0.0, 0.001):
+            bench.put("psm1", end_m + [0.0, offset_m, 0.0])
+            bench.tick(node)
+            codes.append(node.code)
+        assert codes == ["settling"] * 3 + ["moving"]
+        back_s = bench.world.time_s
+        assert bench.run(node) == Status.SUCCESS
+        assert bench.world.time_s - back_s >= SETTLE_S - 1e-9
+
     def test_it_is_counted_and_remembered(self, bench, start_m, node):
         bench.board.grips["psm1"].done = ("something",)
         assert bench.run(node) == Status.SUCCESS
