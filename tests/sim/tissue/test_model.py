@@ -68,7 +68,8 @@ def test_grasp_balances_the_attachments_in_force_and_moment(element, material):
     holes = 3 * len(state.attachment_forces_n)
     at_holes = np.cross(held[:holes], forces[:holes]).sum(axis=0)
     about_origin = moment + np.cross(FOLDED.position_m, force)
-    np.testing.assert_allclose(about_origin, -at_holes, atol=1e-8)
+    # The solver stops at a residual of some 1e-7 N, which acts over a few centimetres.
+    np.testing.assert_allclose(about_origin, -at_holes, atol=3e-8)
 
 
 def test_the_grasped_patch_moves_rigidly_with_the_tip():
