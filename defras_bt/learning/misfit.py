@@ -31,6 +31,11 @@ class Misfit:
     vertices: NDArray[np.int64]
     weights: Floats
 
+    @property
+    def mean_m(self) -> float:
+        """Mean distance of all points."""
+        return float(np.abs(self.residual_m).mean())
+
     def jacobian(self, sensitivity: Floats) -> Floats:
         """Derivative (n, parameters) of the residuals; ``sensitivity`` (vertices, 3, parameters).
 

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from defras_bt.learning.cost import Cost, SearchSettings
 from defras_bt.learning.linearised import Indices, LinearisedFrame
 from defras_bt.learning.misfit import Misfit, misfit
 from defras_bt.learning.observed_cells import ObservedCells
-from defras_bt.learning.replay import Replay, hole_stiffness_n_per_m
+from defras_bt.learning.replay import NotRepeatable, Replay, hole_stiffness_n_per_m
 from defras_sim.geometry import Floats
 from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene
 from defras_sim.surface import Surface
@@ -26,25 +27,6 @@ Mask = NDArray[np.bool_]
 BLOCKS = ((1, 1), (1, 2), (2, 1), (2, 2), (1, 3), (3, 1), (2, 3), (3, 2), (3, 3))
 """Shapes of the blocks of holes that are made to hold, or to let go, at once. Single flips alone
 get stuck: letting go one hole of a patch changes next to nothing while its neighbours hold."""
-
-
-@dataclass(frozen=True)
-class SearchSettings:
-    """What departing from the belief costs, and how far to trust linearity.
-
-    A cell's squared error counts in units of ``error_m``, the accuracy of the model rather than
-    of the camera, and grows only linearly beyond ``robust_m``, where the closest point is likely
-    the wrong one. A changed hole has to gain ``change_price`` in those units, and each edge between
-    a changed and an unchanged neighbour ``edge_price``: belief errs in patches.
-    """
-
-    error_m: float = 0.001
-    robust_m: float = 0.004
-    change_price: float = 0.5
-    edge_price: float = 0.25
-    flips_per_round: int = 6
-    observable_stretch_m: float = 0.001
-    observable_force_share: float = 0.02
 
 
 @dataclass(frozen=True)
@@ -78,6 +60,7 @@ class AttachmentSearch:
         self._settings = settings
         self._believed = belief.attached
         self._grid = np.arange(len(self._believed)).reshape(belief.hole_counts[::-1])
+        self._cost = Cost(self._believed, self._grid.shape, settings)
         self._solves = 0
         self._place_of = np.full(len(self._believed), -1)
         """Where each hole lies in the linearised frames; -1: nothing can be told about it."""
@@ -86,9 +69,14 @@ class AttachmentSearch:
         """Search from ``start`` (holes,), whose shapes the replay holds.
 
         A set that the model cannot take is never chosen.
+
+        Raises:
+            NotRepeatable: the model finds no shape for ``start``, or the camera does not see it.
         """
         attached = start
         cost = before = self._true_cost(attached, keep=True)
+        if not np.isfinite(cost):
+            raise NotRepeatable("the model finds no visible shape to start the search from")
         linearised = self._linearise(attached)
         for _ in range(rounds):
             found = self._first_better(self._advise(attached, linearised), cost)
@@ -116,14 +104,14 @@ class AttachmentSearch:
     def _advise(self, attached: Mask, frames: Sequence[LinearisedFrame]) -> list[Mask]:
         """Sets along a greedy descent of the linearised cost, each better than the one before."""
         here = attached
-        cost = self._linear_cost([frame.residual_m for frame in frames], here[None])[0]
+        cost = self._cost.of([frame.residual_m for frame in frames], here[None])[0]
         steps: list[Mask] = []
         observable = self._place_of >= 0
         for _ in range(self._settings.flips_per_round):
             blocks, sets = self._moves(here, observable)
             costs = np.concatenate(
                 [
-                    self._linear_cost(
+                    self._cost.of(
                         [
                             frame.predict(self._place_of[block], self._change(here, block, new))
                             for frame in frames
@@ -200,7 +188,7 @@ class AttachmentSearch:
             moved = [_moved_m(state.surface, self._belief) for state in states]
             self._stretch_m = np.max(moved, axis=0)
         residuals = [cells.residual_m(each) for cells, each in zip(self._cells, known, strict=True)]
-        return float(self._linear_cost(residuals, attached[None])[0])
+        return float(self._cost.of(residuals, attached[None])[0])
 
     def _linearise(self, attached: Mask) -> list[LinearisedFrame]:
         """Every frame around its kept shape."""
@@ -220,37 +208,18 @@ class AttachmentSearch:
             )
         return frames
 
-    def _linear_cost(self, residuals_m: Sequence[Floats], sets: Mask) -> Floats:
-        """Cost (b,) of sets (b, holes) with the residuals ([b,] cells) of each frame."""
-        s = self._settings
-        limit = s.robust_m / s.error_m
-        cost = self._price(sets)
-        for residual in residuals_m:
-            size = np.abs(np.atleast_2d(residual)) / s.error_m
-            loss = np.where(size <= limit, 0.5 * size**2, limit * (size - 0.5 * limit))
-            cost = cost + loss.sum(axis=1)
-        return cost
-
-    def _price(self, sets: Mask) -> Floats:
-        """Price (b,) of departing from the belief."""
-        changed = (sets != self._believed).reshape(-1, *self._grid.shape)
-        edges = (changed[:, 1:] != changed[:, :-1]).sum(axis=(1, 2))
-        edges = edges + (changed[:, :, 1:] != changed[:, :, :-1]).sum(axis=(1, 2))
-        s = self._settings
-        return s.change_price * changed.sum(axis=(1, 2)) + s.edge_price * edges
-
     def _probability(self, attached: Mask, frames: Sequence[LinearisedFrame]) -> Floats:
         """Probability (holes,) of holding, from the cost of flipping each hole alone."""
         holes = np.arange(len(attached))
         sets = attached ^ np.eye(len(holes), dtype=bool)
-        price = self._price(sets) - self._price(attached[None])
+        price = self._cost.price(sets) - self._cost.price(attached[None])
         seen = np.flatnonzero(self._place_of >= 0)[:, None]
         if len(seen):
             change = self._change(attached, seen, sets[seen[:, 0]])
             place = self._place_of[seen]
             flipped = [frame.predict(place, change) for frame in frames]
-            now = self._linear_cost([frame.residual_m for frame in frames], attached[None])
-            price[seen[:, 0]] = self._linear_cost(flipped, sets[seen[:, 0]]) - now
+            now = self._cost.of([frame.residual_m for frame in frames], attached[None])
+            price[seen[:, 0]] = self._cost.of(flipped, sets[seen[:, 0]]) - now
         wrong = 1.0 / (1.0 + np.exp(np.clip(price, 0.0, 50.0)))
         return np.where(attached, 1.0 - wrong, wrong)
 
