@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 from math import isnan
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import GridPoint, Plan
 from defras_bt.recording.record import Event, Level
@@ -64,8 +67,9 @@ class Blackboard:
     ``command`` and ``rate`` start every tick at hold and 1: a rate is always taken from its
     nominal value, never from the tick before. ``force_over_s`` is how long the force has been over
     its threshold or unknown without a break. ``unexplained``: learning last failed.
-    ``plan_exposing`` lists the manoeuvres after which the plan counts on seeing the region;
-    ``new_plan`` waits for the executive to put it into the tree after the tick.
+    ``plan_belief`` (holes,) marks the attachments that the plan was made with; ``plan_exposing``
+    lists the manoeuvres after which it counts on seeing the region. ``new_plan`` waits for the
+    executive to put it into the tree after the tick.
     """
 
     inputs: TickInputs
@@ -77,6 +81,7 @@ class Blackboard:
     plan: Plan | None = None
     new_plan: Plan | None = None
     plan_exposing: tuple[str, ...] = ()
+    plan_belief: NDArray[np.bool_] | None = None
     no_plan: str | None = None
     preoperative_used: bool = False
     blocked: set[GridPoint] = field(default_factory=set)

@@ -19,7 +19,13 @@ from defras_sim.scene import Scene
 class PlanningService(Protocol):
     """Finds the shortest plan from a situation, or raises NoPlan."""
 
-    def plan(self, situation: Situation, attached: NDArray[np.bool_]) -> Plan: ...
+    def plan(
+        self,
+        situation: Situation,
+        attached: NDArray[np.bool_],
+        *,
+        required_grasp: GridPoint | None = None,
+    ) -> Plan: ...
 
 
 class TwinService(Protocol):

@@ -49,10 +49,11 @@ class SensorsFresh(Guard):
 
 @register_node
 class OperatorPermits(Guard):
-    """Succeeds unless the operator asked to stop."""
+    """Succeeds unless the operator asked to stop, or refused a plan."""
 
     def update(self) -> Status:
-        stop = self.context.board.inputs.operator_stop
+        board = self.context.board
+        stop = board.inputs.operator_stop or board.operator_refused
         return self.fail("stopped", stop) if stop else self.succeed("permitted", "no stop asked")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
+import numpy as np
 from py_trees.common import Status
 from pydantic import Field
 
@@ -38,6 +39,7 @@ class PlanSource(Node):
             board.operator_refused = "the operator did not approve the plan"
             return self.fail("not_approved", board.operator_refused)
         board.new_plan = plan
+        board.plan_belief = self.context.scene.attached
         board.tell("plan", why, data={"actions": [str(action) for action in plan.actions]})
         return self.succeed("planned", why)
 
@@ -107,9 +109,16 @@ class Replan(PlanSource):
         spent = {grip.point for grip in board.grips.values() if set(exposing) <= set(grip.done)}
         return Situation(arms, frozenset(board.blocked | spent) | skipped, exposing)
 
-    def _plan(self, skipped: frozenset[GridPoint], exposing: tuple[str, ...] | None = None) -> Plan:
+    def _plan(
+        self,
+        skipped: frozenset[GridPoint],
+        exposing: tuple[str, ...] | None = None,
+        grasp: GridPoint | None = None,
+    ) -> Plan:
         situation = self._situation(skipped, exposing or self.parameters.exposing)
-        plan = self.context.planner.plan(situation, self.context.scene.attached)
+        plan = self.context.planner.plan(
+            situation, self.context.scene.attached, required_grasp=grasp
+        )
         self.context.board.plan_exposing = situation.exposing
         return plan
 
@@ -119,7 +128,7 @@ class Replan(PlanSource):
         If none does, the one that came closest: the model may be wrong, and looking tells.
         """
         skipped: frozenset[GridPoint] = frozenset()
-        best: tuple[float, frozenset[GridPoint], tuple[str, ...]] | None = None
+        best: tuple[float, GridPoint, tuple[str, ...]] | None = None
         for _ in range(self.parameters.rehearse):
             try:
                 plan = self._plan(skipped)
@@ -128,17 +137,19 @@ class Replan(PlanSource):
             point = _grasp_point(plan)
             seen, exposing = self._outlook(point)
             if best is None or seen > best[0]:
-                best = (seen, skipped, exposing)
+                best = (seen, point, exposing)
             if seen >= self.context.scene.thresholds.roi_visibility:
                 break
             skipped |= {point}
         if best is None:
             return self._plan(frozenset())
-        return self._plan(best[1], best[2])
+        return self._plan(frozenset(), best[2], best[1])
 
     def _outlook(self, point: GridPoint) -> tuple[float, tuple[str, ...]]:
-        """Best simulated visibility of a retraction at ``point`` within the force threshold, and
-        the shortest manoeuvres that reach it (or the goal)."""
+        """Best simulated visibility of a retraction at ``point`` within the force threshold.
+
+        With it the shortest manoeuvres that reach the goal, else the longest that come nearest.
+        """
         done = next((g.done for g in self.context.board.grips.values() if g.point == point), ())
         limit_n = self.context.board.inputs.force_threshold_n
         wanted = self.context.scene.thresholds.roi_visibility
@@ -148,7 +159,7 @@ class Replan(PlanSource):
                 continue
             rehearsal = self.context.rehearse(self.context.scene, point, sequence)
             seen = rehearsal.best_visibility if rehearsal.force_max_n <= limit_n else 0.0
-            if seen > best[0]:
+            if seen >= best[0]:
                 best = (seen, sequence)
             if seen >= wanted:
                 break
@@ -161,3 +172,20 @@ def _grasp_point(plan: Plan) -> GridPoint:
     if point is None:
         raise ValueError(f"plan ends with {plan.actions[-1]}, which concerns no grasp point")
     return point
+
+
+@register_node
+class PlanFitsBelief(Node):
+    """Succeeds while the plan was made with the attachments that are believed now."""
+
+    role: ClassVar[Role] = "guard"
+
+    def update(self) -> Status:
+        made_with = self.context.board.plan_belief
+        if made_with is None:
+            return self.fail("no_plan", "there is no plan yet")
+        if not np.array_equal(made_with, self.context.scene.attached):
+            return self.fail(
+                "outdated", "other attachments are believed than the plan was made with"
+            )
+        return self.succeed("fits", "the plan was made with what is believed now")

@@ -136,7 +136,7 @@ class Simulation(Part):
     elements_xyz: tuple[int, int, int] = (10, 10, 1)
     bullet_elements_xyz: tuple[int, int, int] = (12, 12, 1)
     bullet_step_s: Positive = 0.001
-    bullet_damping: Positive = 0.002
+    bullet_damping: Positive = 0.004
 
 
 ArmName = Literal["psm1", "psm2"]

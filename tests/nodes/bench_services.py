@@ -103,9 +103,19 @@ class BenchPlanner:
         self.points = tuple(points)
         self.asked: list[Situation] = []
 
-    def plan(self, situation: Situation, attached: NDArray[np.bool_]) -> Plan:
+    def plan(
+        self,
+        situation: Situation,
+        attached: NDArray[np.bool_],
+        *,
+        required_grasp: GridPoint | None = None,
+    ) -> Plan:
         self.asked.append(situation)
-        free = [point for point in self.points if point not in situation.blocked]
+        free = [
+            point
+            for point in self.points
+            if point not in situation.blocked and required_grasp in (None, point)
+        ]
         if not free:
             raise NoPlan(12, ["every grasp point is blocked"])
         holding, done = situation.arms["psm1"].holding, situation.arms["psm1"].done
