@@ -27,13 +27,19 @@ class AdoptionRule:
     """The least that held-out points have to say.
 
     The gain has to be one that chance gives in fewer than ``chance`` of cases, at least
-    ``relative_gain`` of the whole distance, at least ``local_gain_m`` where anything changes, and
-    must not make the worst neighbourhood of any frame worse by more than ``worse_m``. A camera that
-    stands elsewhere, fitted to the same points, must not do ``rival_share`` of it.
+    ``relative_gain`` of the whole distance, at least ``explained`` of the part of it that is not
+    the camera's noise, at least ``local_gain_m`` where anything changes, and must not make the
+    worst neighbourhood of any frame worse by more than ``worse_m``. A camera that stands elsewhere,
+    fitted to the same points, must not do ``rival_share`` of it.
+
+    ``explained`` is what keeps other errors of the model from being blamed on attachments: wrong
+    attachments put right explain 77 to 92 % in most simulated cases, right ones bent to make up for
+    a coarse mesh 50 to 68 %.
     """
 
     chance: float = 0.01
     relative_gain: float = 0.1
+    explained: float = 0.7
     local_gain_m: float = 0.0002
     worse_m: float = 0.0005
     rival_share: float = 0.7
@@ -68,6 +74,12 @@ class Hearing:
             and evidence.local_gain_m >= rule.local_gain_m
         ):
             return f"attachments do not explain this: {change}, too little to matter"
+        explained = self._explained(evidence)
+        if not explained >= rule.explained:
+            return (
+                f"attachments do not explain this: {change}, "
+                f"{100 * explained:.0f} % of what is not noise"
+            )
         worse_m = self._worst_m(self.after) - self._worst_m(self.before)
         if not worse_m <= rule.worse_m:
             return (
@@ -87,6 +99,19 @@ class Hearing:
             f"{1e3 * float(np.linalg.norm(moved.position_m)):.1f} mm elsewhere brings them to "
             f"{1e3 * rival_m:.2f} mm"
         )
+
+    def _explained(self, evidence: Evidence) -> float:
+        """Share of the error above the noise that is gone.
+
+        The noise is what is left in the frame that is predicted best, mostly that at rest.
+        """
+        per_frame = [
+            distances_m(self.camera, [frame.cloud_m], [shape])[0].mean()
+            for shapes in (self.before, self.after)
+            for frame, shape in zip(self.keyframes, shapes, strict=True)
+        ]
+        excess = evidence.before_m - float(np.min(per_frame))
+        return (evidence.before_m - evidence.after_m) / excess if excess > 0 else 0.0
 
     def _worst_m(self, shapes: Shapes) -> float:
         """Worst neighbourhood of all frames: what monitoring will look at. NaN if one is unknown.
