@@ -21,6 +21,7 @@ from defras_sim.worlds.colours import BED, ROI
 from defras_sim.worlds.error import WorldError
 from defras_sim.worlds.jaw_contact import distance_to_upper_m
 from defras_sim.worlds.kinematic_tool import JAW_ON_TISSUE_RAD
+from defras_sim.worlds.native_output import without_native_output
 from defras_sim.worlds.protocol import (
     HOLD,
     JAW_OPEN_RAD,
@@ -50,17 +51,17 @@ class BulletWorld:
         self._ticks = 0
         self._steps = max(1, round(scene.tick_s / scene.simulation.bullet_step_s))
         self._command = HOLD
-        self._client: Any = BulletClient(connection_mode=pybullet.DIRECT)
-        self._client.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
-        self._client.setGravity(0, 0, 0)
-        self._client.setTimeStep(scene.tick_s / self._steps)
-        self._lay_bed()
-        self._tissue = BulletTissue(self._client, scene)
-        self._arms = {
-            name: BulletArm(self._client, name, np.array(arm.rcm_m), np.array(arm.home_tip_m))
-            for name, arm in scene.arms.items()
-        }
-        self._forces_n = dict.fromkeys(self._arms, 0.0)
+        with without_native_output():
+            self._client: Any = BulletClient(connection_mode=pybullet.DIRECT)
+            self._client.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
+            self._client.setGravity(0, 0, 0)
+            self._client.setTimeStep(scene.tick_s / self._steps)
+            self._lay_bed()
+            self._tissue = BulletTissue(self._client, scene)
+            self._arms = {
+                name: BulletArm(self._client, name, np.array(arm.rcm_m), np.array(arm.home_tip_m))
+                for name, arm in scene.arms.items()
+            }
         self._latest = Observation(0.0, {})
         self._sense()
 
