@@ -32,9 +32,9 @@ class AdoptionRule:
     worst neighbourhood of any frame worse by more than ``worse_m``. A camera that stands elsewhere,
     fitted to the same points, must not do ``rival_share`` of it.
 
-    ``explained`` is what keeps other errors of the model from being blamed on attachments: wrong
-    attachments put right explain 77 to 92 % in most simulated cases, right ones bent to make up for
-    a coarse mesh 50 to 68 %.
+    ``explained`` keeps other errors of the model from being blamed on attachments: set right where
+    they were wrong, they explain about 80 to 90 %; bent to make up for a coarse mesh, 50 to 67 %
+    (three simulated folds with the right belief).
     """
 
     chance: float = 0.01

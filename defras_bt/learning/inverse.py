@@ -32,7 +32,7 @@ class InverseEstimator:
     coarse_rounds: int = 8
     fine_rounds: int = 3
     most_fitted: int = 3
-    least_travel_m: float = 0.005
+    least_travel_m: float = 0.003
 
     def estimate(
         self, belief: Scene, keyframes: Sequence[Keyframe], rng: np.random.Generator
