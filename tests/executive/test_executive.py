@@ -54,7 +54,7 @@ def broken_leaf(stage: Stage) -> None:
 
 
 def broken_planner(stage: Stage) -> None:
-    def plan(situation, attached):
+    def plan(situation, attached, *, required_grasp=None):
         raise RuntimeError("the cable is cut")
 
     stage.bench.planner.plan = plan
