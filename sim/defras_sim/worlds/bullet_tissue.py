@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import Scene
@@ -87,6 +88,10 @@ class BulletTissue:
         )
         volume_m3 = tissue.length_x_m * tissue.width_y_m * tissue.thickness_m
         with tempfile.TemporaryDirectory() as folder:
+            # Without a texture of its own a soft body wears PyBullet's checkerboard.
+            plain = Path(folder) / "plain.png"
+            Image.new("RGB", (4, 4), "white").save(plain)
+            texture = self._client.loadTexture(str(plain))
             file = Path(folder) / "slab.vtk"
             _write_vtk(file, self._rest_m, tetrahedra)
             body = self._client.loadSoftBody(
@@ -100,7 +105,9 @@ class BulletTissue:
                 collisionMargin=CONTACT_MARGIN_M,
             )
         flags = self._client.VISUAL_SHAPE_DOUBLE_SIDED
-        self._client.changeVisualShape(body, -1, rgbaColor=[*TISSUE, 1], flags=flags)
+        self._client.changeVisualShape(
+            body, -1, rgbaColor=[*TISSUE, 1], flags=flags, textureUniqueId=texture
+        )
         return int(body)
 
 
