@@ -37,27 +37,36 @@ class Perception:
         self._force_threshold_n = force_threshold_n
         self._operator_stop = operator_stop
         self._grips = GripTracker(board, twin)
+        self._touched = False
 
     def update(self, tick: int, observation: Observation) -> TickInputs:
         """Everything the tree may know at this tick."""
         scene, board = self._twin.scene, self._board
         sensed = sense(observation, scene)
         missing = stale(sensed, scene)
-        if self._grips.update(sensed):
+        if self._grips.update(sensed, unsound=missing):
+            self._touched = True
             self._keyframes.clear()
             self._monitor.twin_changed()
-        setpoints = {n: arm.setpoint_tissue_from_tip for n, arm in sensed.arms.items()}
-        state = self._twin.track(setpoints, sensed.time_s)
-        force_n = self._twin.force_n
+            if board.grips:
+                self._monitor.tissue_grasped()
+            else:
+                self._monitor.tissue_released(sensed.time_s)
+        # Where nobody knows what a holding arm does, the twin cannot say what the tissue does.
+        state, force_n, reading = None, float("nan"), None
+        if not any(name in missing for name in board.grips):
+            setpoints = {n: arm.setpoint_tissue_from_tip for n, arm in sensed.arms.items()}
+            state = self._twin.track(setpoints, sensed.time_s)
+            force_n = self._twin.force_n
+            reading = self._monitored(sensed, state)
+            if board.grips and "cloud" not in missing:
+                self._keyframes.add(
+                    sensed.time_s,
+                    {name: grip.grasp_tip for name, grip in board.grips.items()},
+                    {name: setpoints[name] for name in board.grips},
+                    sensed.cloud,
+                )
         self._count_force(force_n, scene.tick_s)
-        reading = self._monitored(sensed, state)
-        if board.grips and "cloud" not in missing and sensed.cloud is not None:
-            self._keyframes.add(
-                sensed.time_s,
-                {name: grip.grasp_tip for name, grip in board.grips.items()},
-                {name: setpoints[name] for name in board.grips},
-                sensed.cloud,
-            )
         return TickInputs(
             tick=tick,
             time_s=sensed.time_s,
@@ -71,7 +80,8 @@ class Perception:
         )
 
     def _monitored(self, sensed: SensedObservation, state: TissueState) -> MonitorReading | None:
-        if not self._board.rest_calibrated and not self._board.grips:
+        # Tissue that was held once may lie otherwise: rest is what was seen before.
+        if not self._board.rest_calibrated and not self._touched:
             self._monitor.observe_rest(sensed.cloud, state.surface)
         if not self._monitor.calibration:
             return None

@@ -22,6 +22,8 @@ from defras_sim.worlds.protocol import PointCloud
 # stops a motion nor teaches the twin. Costs one camera period, 1.5 mm at the speed with tissue.
 CONFIRMING_FRAMES = 2
 _MAX_REST_FRAMES = 100
+# Released tissue swings back while the quasi-static twin is at rest at once.
+SETTLING_S = 5.0
 _HISTORY_S = 1.0
 
 
@@ -40,6 +42,7 @@ class WarningMonitor:
         self._surfaces: deque[tuple[float, Surface]] = deque()
         self._raw_states: deque[Mapping[str, int]] = deque(maxlen=CONFIRMING_FRAMES)
         self._last: MonitorReading | None = None
+        self._settling_until_s = -np.inf
 
     @property
     def calibration(self) -> Mapping[str, RestCalibration]:
@@ -93,7 +96,7 @@ class WarningMonitor:
             )
             if metric.name == "local":
                 per_point = measured.per_point_m
-        self._raw_states.append(raw)
+        self._raw_states.append(self._settled(raw, cloud.stamp_s))
         confirmed = {
             name: min(states[name] for states in self._raw_states)
             if len(self._raw_states) == CONFIRMING_FRAMES
@@ -108,6 +111,24 @@ class WarningMonitor:
         self._surfaces.clear()
         self._raw_states.clear()
         self._last = None
+
+    def tissue_released(self, time_s: float) -> None:
+        """All tissue was let go at ``time_s``: raise no state until it agrees with the twin again.
+
+        After 5 s it should; what is still off then counts as ever. Mu is told all the while.
+        """
+        self._settling_until_s = time_s + SETTLING_S
+
+    def tissue_grasped(self) -> None:
+        """Tissue is held again: whatever is off now counts."""
+        self._settling_until_s = -np.inf
+
+    def _settled(self, raw: Mapping[str, int], stamp_s: float) -> Mapping[str, int]:
+        if stamp_s >= self._settling_until_s:
+            return raw
+        if not any(raw.values()):
+            self._settling_until_s = stamp_s
+        return dict.fromkeys(raw, 0)
 
     def _unknown(self, time_s: float) -> MonitorReading:
         names = [metric.name for metric in self._metrics]

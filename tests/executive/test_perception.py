@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from defras_bt.executive.blackboard import LearningAttempt
 from defras_bt.executive.perception import Perception
+from defras_sim.geometry import Pose
 from defras_sim.worlds.protocol import JAW_CLOSED_RAD, JAW_OPEN_RAD, ArmCommand, Command
 from tests.nodes.bench import EPSILON_N, Bench
 from tests.nodes.bench_services import MU_M
@@ -125,6 +128,14 @@ class TestMonitoring:
         senses.look()
         assert senses.bench.monitor.rest_frames == frames
 
+    def test_rest_is_what_was_seen_before_the_first_grasp(self, senses):
+        senses.grasp()
+        senses.turn_jaw(JAW_OPEN_RAD)
+        assert senses.bench.board.grips == {}
+        frames = senses.bench.monitor.rest_frames
+        senses.look()
+        assert senses.bench.monitor.rest_frames == frames
+
     def test_rest_frames_end_with_the_calibration(self, senses):
         senses.bench.board.rest_calibrated = True
         senses.look()
@@ -155,6 +166,7 @@ class TestGrips:
         assert bench.board.last_learning is None
         assert not bench.board.unexplained
         assert bench.monitor.changes == 2
+        assert bench.monitor.settling, "released tissue may swing back without a warning"
 
     def test_shapes_are_kept_while_tissue_is_held_and_forgotten_with_the_grip(self, senses):
         keyframes = senses.bench.keyframes
@@ -172,6 +184,40 @@ class TestGrips:
         senses.bench.world.cloud_m = None
         senses.look()
         assert senses.bench.keyframes.frames()[-1].stamp_s == last_s
+
+    def test_a_grip_that_begins_on_the_way_off_is_at_the_nearest_grasp_point(self, senses):
+        senses.grasp()
+        senses.turn_jaw(JAW_OPEN_RAD)
+        assert senses.bench.board.at == {}
+        senses.turn_jaw(JAW_CLOSED_RAD)
+        assert senses.bench.board.grips["psm1"].point == (2, 4)
+
+    def test_a_jaw_that_does_not_tell_holds_what_it_held(self, senses):
+        senses.grasp()
+        bench = senses.bench
+        seen = bench.world.observe()
+        silent = {name: replace(arm, grasped=None) for name, arm in seen.arms.items()}
+        senses.perception.update(99, replace(seen, arms=silent))
+        assert set(bench.board.grips) == bench.twin.holding == {"psm1"}
+
+    @pytest.mark.parametrize("lost", ["no reading", "no number"])
+    def test_of_an_arm_that_holds_and_is_lost_nothing_is_known(self, senses, lost):
+        senses.grasp()
+        bench = senses.bench
+        seen = bench.world.observe()
+        arms = dict(seen.arms)
+        if lost == "no reading":
+            del arms["psm1"]
+        else:
+            nowhere = Pose(np.full(3, NAN))
+            arms["psm1"] = replace(arms["psm1"], setpoint_tissue_from_tip=nowhere, grasped=False)
+        inputs = senses.perception.update(99, replace(seen, arms=arms))
+        assert any("psm1" in sentence for sentence in inputs.missing)
+        assert (inputs.twin, inputs.reading) == (None, None)
+        assert np.isnan(inputs.force_n)
+        assert bench.board.force_over_s == pytest.approx(TICK_S)
+        assert set(bench.board.grips) == bench.twin.holding == {"psm1"}
+        assert not np.isnan(senses.look().force_n)
 
     def test_a_grip_where_the_twin_has_no_tissue_is_an_error(self, senses):
         def nothing_there(arm, tip):

@@ -116,3 +116,34 @@ def test_a_changed_twin_starts_with_a_clean_slate(
     reading = rested.reading(PointCloud(2.1, take_cloud(shape, 1)), shape, 2.1)
     assert reading.warning_state["local"] == 0
     assert reading.mu_m["local"] < 0.0005
+
+
+class TestRelease:
+    def warn(self, monitor: WarningMonitor, shape: Surface, rest: Surface, take, time_s: float):
+        for late_s in (0.0, 0.1):
+            cloud = PointCloud(time_s + late_s, take(shape, 7))
+            reading = monitor.reading(cloud, rest, time_s + late_s)
+        return reading
+
+    def test_tissue_that_swings_back_raises_no_state(self, rested, slab, take_cloud) -> None:
+        rested.tissue_released(2.0)
+        reading = self.warn(rested, slab(raised(0.009)), slab(), take_cloud, 2.1)
+        assert reading.warning_state["local"] == 0
+        assert reading.mu_m["local"] > 0.006, "the discrepancy itself is told"
+
+    def test_once_it_agreed_a_state_counts_again(self, rested, slab, take_cloud) -> None:
+        rested.tissue_released(2.0)
+        self.warn(rested, slab(), slab(), take_cloud, 2.1)
+        reading = self.warn(rested, slab(raised(0.009)), slab(), take_cloud, 2.4)
+        assert reading.warning_state["local"] == 3
+
+    def test_what_is_still_off_after_five_seconds_counts(self, rested, slab, take_cloud) -> None:
+        rested.tissue_released(2.0)
+        reading = self.warn(rested, slab(raised(0.009)), slab(), take_cloud, 7.1)
+        assert reading.warning_state["local"] == 3
+
+    def test_a_new_grasp_ends_the_settling(self, rested, slab, take_cloud) -> None:
+        rested.tissue_released(2.0)
+        rested.tissue_grasped()
+        reading = self.warn(rested, slab(raised(0.009)), slab(), take_cloud, 2.1)
+        assert reading.warning_state["local"] == 3

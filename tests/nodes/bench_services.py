@@ -72,6 +72,7 @@ class BenchMonitor:
         self.rest_frames = 0
         self.changes = 0
         self.heals = False
+        self.settling = False
 
     def warn(self, state: int, *metrics: str) -> None:
         for metric in metrics or tuple(self.states):
@@ -86,6 +87,12 @@ class BenchMonitor:
     def reading(self, cloud: PointCloud | None, surface: Surface, time_s: float) -> MonitorReading:
         mu_m = dict(self.mu_m) if cloud is not None else dict.fromkeys(self.mu_m, float("nan"))
         return MonitorReading(time_s, mu_m, dict(self.states))
+
+    def tissue_grasped(self) -> None:
+        self.settling = False
+
+    def tissue_released(self, time_s: float) -> None:
+        self.settling = True
 
     def twin_changed(self) -> None:
         self.changes += 1
