@@ -15,6 +15,7 @@ from defras_sim.worlds.protocol import HOLD, ArmCommand, ArmObservation, Command
 BELOW_SURFACE_M = 0.003
 BESIDE_TISSUE_M = 0.10
 ABOVE_TISSUE_M = 0.12
+TURNING_RAD_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -41,11 +42,9 @@ class CommandGate:
         self._low_m = np.array([*-half, -BELOW_SURFACE_M])
         self._high_m = np.array([*half, ABOVE_TISSUE_M])
 
-    def check(
-        self, proposed: Command, rate: float, inputs: TickInputs, trip: str | None = None
-    ) -> GateVerdict:
-        """The command that may leave. ``trip``: a reason that the executive knows of."""
-        blind = [*_blindness(inputs, trip), *_faults(proposed, rate, inputs.observation)]
+    def check(self, proposed: Command, rate: float, inputs: TickInputs) -> GateVerdict:
+        """The command that may leave."""
+        blind = [*_blindness(inputs), *_faults(proposed, rate, inputs.observation)]
         tissue = self._tissue_trips(inputs)
         if blind:
             return GateVerdict(HOLD, (*blind, *tissue))
@@ -53,7 +52,8 @@ class CommandGate:
             jaws = {name: ArmCommand(jaw_rad=arm.jaw_rad) for name, arm in proposed.arms.items()}
             return GateVerdict(Command(jaws), tuple(tissue))
         observed = inputs.observation.arms
-        holding = any(arm.grasped for arm in observed.values())
+        # A jaw that does not tell may hold tissue.
+        holding = any(arm.grasped is not False for arm in observed.values())
         arms = {
             name: self._limited(command, rate, observed[name], holding)
             for name, command in proposed.arms.items()
@@ -87,15 +87,14 @@ class CommandGate:
         )
         return ArmCommand(
             (end - start) / self._tick_s,
-            _clipped(command.angular_rad_s, 1.0) * rate,
+            _clipped(command.angular_rad_s, TURNING_RAD_S) * rate,
             command.jaw_rad,
         )
 
 
-def _blindness(inputs: TickInputs, trip: str | None) -> list[str]:
+def _blindness(inputs: TickInputs) -> list[str]:
     """Reasons to touch nothing, jaws included."""
-    stops = (trip, *inputs.missing, inputs.operator_stop)
-    return [stop for stop in stops if stop]
+    return [stop for stop in (*inputs.missing, inputs.operator_stop) if stop]
 
 
 def _faults(proposed: Command, rate: float, observation: Observation) -> list[str]:

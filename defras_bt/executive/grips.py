@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Protocol
 
+import numpy as np
+
 from defras_bt.executive.blackboard import Blackboard, Grip
+from defras_bt.planning.facts import grid_points
+from defras_bt.planning.plan import GridPoint
 from defras_sim.geometry import Pose
+from defras_sim.scene import Scene
 from defras_sim.worlds.protocol import Observation
 
 
 class HoldsTissue(Protocol):
     """The part of the twin that a grip concerns."""
+
+    @property
+    def scene(self) -> Scene: ...
 
     def grasp(self, arm: str, tissue_from_tip: Pose) -> None: ...
 
@@ -24,19 +33,23 @@ class GripTracker:
         self._board = board
         self._twin = twin
 
-    def update(self, observation: Observation) -> bool:
+    def update(self, observation: Observation, unsound: Collection[str] = ()) -> bool:
         """Take over what the jaws say; True if any grip began or ended.
+
+        An arm whose reading is ``unsound``, or whose jaw does not tell, holds what it held.
 
         Raises:
             ValueError: a jaw holds something where the twin has no tissue.
         """
         changed = False
         for name, arm in observation.arms.items():
+            if name in unsound or arm.grasped is None:
+                continue
             holding = name in self._board.grips
             if arm.grasped and not holding:
                 tip = arm.setpoint_tissue_from_tip
                 self._twin.grasp(name, tip)
-                self._board.grips[name] = Grip(self._board.at.get(name, (0, 0)), tip)
+                self._board.grips[name] = Grip(self._point_of(name, tip), tip)
                 changed = True
             elif not arm.grasped and holding:
                 self._twin.release(name)
@@ -47,3 +60,13 @@ class GripTracker:
                 self._board.unexplained = False
                 changed = True
         return changed
+
+    def _point_of(self, arm: str, tip: Pose) -> GridPoint:
+        """The grasp point reached last, else the nearest: a jaw may still close on its way off."""
+        if arm in self._board.at:
+            return self._board.at[arm]
+        scene = self._twin.scene
+        return min(
+            grid_points(scene),
+            key=lambda point: float(np.linalg.norm(scene.grasp_xy_m(*point) - tip.position_m[:2])),
+        )

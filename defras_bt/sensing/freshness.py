@@ -61,8 +61,9 @@ def age_s(stamp_s: float | None, now_s: float) -> float:
 def _arm_age_s(arm: ArmObservation | None, now_s: float) -> float:
     if arm is None:
         return float("inf")
-    pose = arm.tissue_from_tip
     joints = np.zeros(0) if arm.joints is None else arm.joints
-    values = (pose.position_m, pose.rotation.ravel(), joints, np.array([arm.jaw_rad]))
-    sound = bool(np.all(np.isfinite(np.concatenate(values))))
+    numbers = [joints, np.array([arm.jaw_rad])]
+    for pose in (arm.tissue_from_tip, arm.setpoint_tissue_from_tip):
+        numbers += [pose.position_m, pose.rotation.ravel()]
+    sound = bool(np.all(np.isfinite(np.concatenate(numbers))))
     return age_s(arm.stamp_s if sound else None, now_s)

@@ -74,7 +74,11 @@ class TestWithoutTrip:
 
     @pytest.mark.parametrize(
         ("grasped", "limit"),
-        [(False, SCENE.motion.reach_speed_m_s), (True, SCENE.motion.tissue_speed_m_s)],
+        [
+            (False, SCENE.motion.reach_speed_m_s),
+            (True, SCENE.motion.tissue_speed_m_s),
+            (None, SCENE.motion.tissue_speed_m_s),
+        ],
     )
     def test_a_fast_one_is_clipped_and_keeps_its_direction(self, grasped, limit):
         velocity = np.array([0.3, -0.4, 1.2])
@@ -154,15 +158,10 @@ class TestTrips:
         assert verdict.command == HOLD
         assert verdict.reasons[0] == reason
 
-    def test_a_trip_of_the_executive(self):
-        verdict = GATE.check(go(), 1.0, inputs(), trip="the connection is lost")
-        assert (verdict.command, verdict.reasons) == (HOLD, ("the connection is lost",))
-
     def test_all_reasons_are_given(self):
         says = {"missing": ("no cloud",), "force_n": NAN, "reading": reading(2)}
-        verdict = GATE.check(go(), 1.0, inputs(**says), trip="lost")
+        verdict = GATE.check(go(), 1.0, inputs(**says))
         assert verdict.reasons == (
-            "lost",
             "no cloud",
             "the force estimate is missing",
             "the warning state is 2",
@@ -229,15 +228,14 @@ trips = st.sampled_from([*TISSUE_TRIPS.values(), *BLIND_TRIPS.values()]).map(lam
     tips=st.tuples(places, places),
     held=st.tuples(st.booleans(), st.booleans()),
     says=st.just({}) | trips,
-    trip=st.none() | st.just("the connection is lost"),
 )
-@example(go([1e308, 1e308, -1e308]), 1.0, ((0, 0, 0), (0, 0, 0)), (False, False), {}, None)
-def test_whatever_is_proposed(proposed, rate, tips, held, says, trip):
+@example(go([1e308, 1e308, -1e308]), 1.0, ((0, 0, 0), (0, 0, 0)), (False, False), {})
+def test_whatever_is_proposed(proposed, rate, tips, held, says):
     """Speed is at most limit times rate, the box is not left, and a trip means motion zero."""
     arms = {f"psm{i + 1}": arm(tips[i], held[i]) for i in range(2)}
     with np.errstate(over="ignore"):
-        verdict = GATE.check(proposed, rate, inputs(arms, **says), trip)
-    stopped = bool(says or trip or verdict.reasons)
+        verdict = GATE.check(proposed, rate, inputs(arms, **says))
+    stopped = bool(says or verdict.reasons)
     limit = SCENE.motion.tissue_speed_m_s if any(held) else SCENE.motion.reach_speed_m_s
     low, high = [-HALF_M, -HALF_M, -BELOW_SURFACE_M], [HALF_M, HALF_M, ABOVE_TISSUE_M]
     assert set(verdict.command.arms) <= set(arms)
