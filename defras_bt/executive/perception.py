@@ -48,6 +48,10 @@ class Perception:
             self._touched = True
             self._keyframes.clear()
             self._monitor.twin_changed()
+            if board.grips:
+                self._monitor.tissue_grasped()
+            else:
+                self._monitor.tissue_released(sensed.time_s)
         # Where nobody knows what a holding arm does, the twin cannot say what the tissue does.
         state, force_n, reading = None, float("nan"), None
         if not any(name in missing for name in board.grips):
