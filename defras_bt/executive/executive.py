@@ -157,7 +157,6 @@ class Executive:
         """The tick as the executive knows it; what is true only the world knows."""
         board, slot = self._board, self.tree.plan_slot
         snapshot = self._ticked.snapshot(self.tree)
-        step = slot.step if slot is not None else None
         return TickRecord(
             tick=inputs.tick,
             time_s=inputs.time_s,
@@ -174,12 +173,14 @@ class Executive:
             node_status=snapshot.status,
             node_message=snapshot.message,
             plan=board.plan,
-            plan_step=step if step is not None else 0,
+            plan_step=slot.step if slot is not None else None,
             events=tuple(board.events),
         )
 
     def _record_failure(self, sentence: str) -> None:
-        """One more record, so that nobody has to guess how the run ended."""
-        last = self._last or self._known(self._board.inputs, HOLD)
+        """One more record, with what the broken tick told, so that nobody has to guess."""
+        board = self._board
+        last = self._last or self._known(board.inputs, HOLD)
+        untold = board.events if board.inputs.tick > last.tick else ()
         event = Event(last.time_s, "error", "error", sentence)
-        self._recorder.tick(replace(last, tick=last.tick + 1, sent=HOLD, events=(event,)))
+        self._recorder.tick(replace(last, tick=last.tick + 1, sent=HOLD, events=(*untold, event)))

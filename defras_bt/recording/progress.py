@@ -91,10 +91,9 @@ def progress_line(record: TickRecord, info: RunInfo) -> Table:
 
 
 def _action(record: TickRecord) -> str:
-    plan, step = record.plan, record.plan_step
-    if plan is None or step >= len(plan.actions):
+    if record.plan is None or record.action is None:
         return "no action"
-    return f"{step + 1}/{len(plan.actions)} {action_sentence(plan.actions[step])}"
+    return f"{record.action.time}/{len(record.plan.actions)} {action_sentence(record.action)}"
 
 
 def _monitoring(record: TickRecord, info: RunInfo) -> tuple[Text, ...]:

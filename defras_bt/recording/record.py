@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defras_bt.monitoring.reading import MonitorReading
-from defras_bt.planning.plan import Plan
+from defras_bt.planning.plan import Action, Plan
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
 from defras_sim.tissue.state import TissueState
@@ -24,7 +24,7 @@ class Event:
     """Something worth telling: a sentence that a surgeon understands, and a kind for counting.
 
     Kinds: start, plan, action, warning, force, learning, replan, goal, human, error, hold, end.
-    One event of kind ``action`` is one action begun, of kind ``replan`` one new plan asked for, of
+    One event of kind ``action`` is one action finished, of kind ``replan`` one new plan asked for, of
     kind ``learning`` one attachment update tried. ``data`` holds what a program counts or draws:
     ``learning`` says ``{"adopted": bool}``.
     """
@@ -44,8 +44,8 @@ class TickRecord:
     where the world has none. ``true_surface`` only for pictures. ``node_status`` maps each tree
     path ("defras/operate/act") to SUCCESS, FAILURE, RUNNING or "" where it was not ticked;
     ``node_message`` to its last word. ``sent`` left the gate; ``proposed`` came from the tree.
-    ``believed`` (holes,) marks the attachments believed now. ``plan`` and ``plan_step`` (0-based)
-    say what is carried out.
+    ``believed`` (holes,) marks the attachments believed now. ``plan`` is the latest plan,
+    ``plan_step`` the 0-based index of the action in it that is carried out, None while none is.
     """
 
     tick: int
@@ -63,8 +63,15 @@ class TickRecord:
     node_status: Mapping[str, str]
     node_message: Mapping[str, str]
     plan: Plan | None
-    plan_step: int
+    plan_step: int | None
     events: tuple[Event, ...] = ()
+
+    @property
+    def action(self) -> Action | None:
+        """What is carried out; None while no action is."""
+        if self.plan is None or self.plan_step is None:
+            return None
+        return self.plan.actions[self.plan_step]
 
 
 @dataclass(frozen=True)

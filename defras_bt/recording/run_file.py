@@ -40,7 +40,7 @@ class RunFile(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, title="run.json")
     outcome: Outcome = Field(description="goal, not_reached, human (asked for) or error")
     roi_visibility: Share | None = Field(description="share of the region seen at the end")
-    actions: Count = Field(description="actions begun")
+    actions: Count = Field(description="actions finished")
     replans: Count = Field(description="new plans asked for after the first")
     warnings: Warnings
     attachment_updates: AttachmentUpdates

@@ -55,9 +55,7 @@ class RunLog:
             if status:
                 self.node_ticks.setdefault(path, Counter())[status] += 1
         self._add_numbers(record)
-        plan, step = record.plan, record.plan_step
-        acting = plan is not None and step < len(plan.actions)
-        _extend(self._spans, record.time_s, plan.actions[step].name if plan and acting else "")
+        _extend(self._spans, record.time_s, record.action.name if record.action else "")
         state = None if record.reading is None else record.reading.warning_state.get(self.metric)
         _extend(self._states, record.time_s, "" if state is None else str(state))
 

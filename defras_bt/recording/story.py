@@ -49,8 +49,8 @@ def newton(force_n: float | None) -> str:
     return "unknown" if force_n is None or math.isnan(force_n) else f"{force_n:.2f} N"
 
 
-def plan_markdown(plan: Plan | None, step: int) -> str:
-    """Numbered sentences; done ones are ticked, the one carried out is bold."""
+def plan_markdown(plan: Plan | None, step: int | None) -> str:
+    """Numbered sentences; while one is carried out it is bold, and those before it are ticked."""
     if plan is None:
         return "No plan yet."
     origin = "pre-operative" if plan.source == "preoperative" else "made during the operation"
@@ -58,7 +58,7 @@ def plan_markdown(plan: Plan | None, step: int) -> str:
     lines = [f"### Plan ({origin}{proof})", ""]
     for index, action in enumerate(plan.actions):
         sentence = f"{action_sentence(action)}."
-        if index < step:
+        if step is not None and index < step:
             sentence = f"{sentence} ✓"
         elif index == step:
             sentence = f"**{sentence}**"

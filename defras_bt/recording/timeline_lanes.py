@@ -45,8 +45,7 @@ class Lanes:
         if self._changes.new("warning_state", state):
             said = "" if state is None else str(state)
             self._stream.log("monitor/warning_state", rr.StateChange(state=said))
-        plan, step = record.plan, record.plan_step
-        action = plan.actions[step] if plan is not None and step < len(plan.actions) else None
+        action = record.action
         if self._changes.new("action", action):
             self._stream.log(
                 "plan/action", rr.StateChange(state="" if action is None else action.name)

@@ -96,6 +96,18 @@ class TestExceptions:
         assert "the cable is cut" in event.sentence
         assert (stage.board.outcome, stage.board.outcome_reason) == ("error", str(failure))
 
+    def test_what_the_broken_tick_told_before_it_broke_is_recorded_once(self):
+        stage = at_pull()
+
+        def update() -> Status:
+            stage.board.tell("hold", "Something feels wrong.")
+            raise RuntimeError("the cable is cut")
+
+        stage.slot.current_child.update = update
+        run(stage)
+        assert [event.kind for event in stage.notes.records[-1].events] == ["hold", "error"]
+        assert stage.notes.told("hold") == ["Something feels wrong."]
+
     def test_ticks_and_times_of_the_records_go_on_to_the_end(self):
         stage = at_pull()
         broken_twin(stage)
@@ -224,7 +236,15 @@ class TestRecords:
         stage = at_pull()
         last = stage.notes.records[-1]
         assert last.plan is stage.board.plan
-        assert last.plan.actions[last.plan_step].name == "pull"
+        assert last.action == last.plan.actions[last.plan_step]
+        assert last.action.name == "pull"
+
+    def test_while_a_guard_holds_the_plan_back_no_action_is_carried_out(self):
+        stage = at_pull()
+        stage.bench.world.cloud_m = None
+        record = stage.ticks(1.0)[-1]
+        assert "cloud" in str(record.node_message)
+        assert (record.plan_step, record.action) == (None, None)
 
     def test_a_new_plan_is_carried_out_from_the_next_tick_on(self):
         stage = Stage("fras")

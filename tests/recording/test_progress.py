@@ -63,7 +63,7 @@ def test_the_row(short_run: SyntheticRun) -> None:
         ({"force_n": float("nan")}, "F ?/0.30 N"),
         ({"plan": None}, "no action"),
         ({"reading": None}, "0.30 N rate"),
-        ({"plan_step": 5}, "no action"),
+        ({"plan_step": None}, "no action"),
     ],
 )
 def test_what_is_unknown(short_run: SyntheticRun, changes: dict[str, object], words: str) -> None:
