@@ -47,6 +47,11 @@ def run_table1(
         task = progress.add_task("runs", total=len(BELIEVED) * len(RELATIONS) * len(names))
         for row in table1(world, names, seed, jobs):
             rows.append(row)
+            seen = row.values.get("roi_visibility") or 0.0
+            progress.console.print(
+                f"{row.scene} {row.relation}, {row.tree}: {row.values['outcome']}, "
+                f"{seen:.0%} visible"
+            )
             progress.advance(task)
     summary, cases = by_tree(rows), by_case(rows)
     write_benchmark(
