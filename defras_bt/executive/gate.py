@@ -106,7 +106,7 @@ def _faults(proposed: Command, rate: float, observation: Observation) -> list[st
         observed = observation.arms.get(name)
         if observed is None:
             faults.append(f"{name} is not an arm of this set-up")
-        elif not _finite(command):
+        elif not command.is_finite:
             faults.append(f"the command for {name} is not a number")
         elif not np.all(np.isfinite(observed.setpoint_tissue_from_tip.position_m)):
             faults.append(f"the set-point of {name} is not a number")
@@ -116,12 +116,3 @@ def _faults(proposed: Command, rate: float, observation: Observation) -> list[st
 def _clipped(vector: Floats, limit: float) -> Floats:
     length = float(np.linalg.norm(vector))
     return vector * (limit / length) if length > limit else vector
-
-
-def _finite(command: ArmCommand) -> bool:
-    jaw = 0.0 if command.jaw_rad is None else command.jaw_rad
-    return bool(
-        np.all(np.isfinite(command.linear_m_s))
-        and np.all(np.isfinite(command.angular_rad_s))
-        and np.isfinite(jaw)
-    )

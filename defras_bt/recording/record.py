@@ -24,9 +24,9 @@ class Event:
     """Something worth telling: a sentence that a surgeon understands, and a kind for counting.
 
     Kinds: start, plan, action, warning, force, learning, replan, goal, human, error, hold, end.
-    One event of kind ``action`` is one action finished, of kind ``replan`` one new plan asked for, of
-    kind ``learning`` one attachment update tried. ``data`` holds what a program counts or draws:
-    ``learning`` says ``{"adopted": bool}``.
+    One event of kind ``action`` is one action finished, of kind ``replan`` one new plan asked for,
+    of kind ``learning`` one attachment update tried. ``data`` holds what a program counts or
+    draws: ``learning`` says ``{"adopted": bool}``.
     """
 
     time_s: float

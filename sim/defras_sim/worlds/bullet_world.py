@@ -17,21 +17,20 @@ from defras_sim.surface import Surface
 from defras_sim.worlds.bullet_arm import BulletArm
 from defras_sim.worlds.bullet_camera import take_picture
 from defras_sim.worlds.bullet_tissue import CONTACT_MARGIN_M, BulletTissue
+from defras_sim.worlds.clock import TickClock
 from defras_sim.worlds.colours import BED, ROI
 from defras_sim.worlds.error import WorldError
-from defras_sim.worlds.jaw_contact import distance_to_upper_m
-from defras_sim.worlds.kinematic_tool import JAW_ON_TISSUE_RAD
+from defras_sim.worlds.jaw_contact import meets_tissue
+from defras_sim.worlds.kinematic_tool import ARMED_ABOVE_RAD, JAW_ON_TISSUE_RAD
 from defras_sim.worlds.native_output import without_native_output
 from defras_sim.worlds.protocol import (
     HOLD,
-    JAW_OPEN_RAD,
     ArmCommand,
     ArmObservation,
     Command,
     Observation,
 )
 
-GRASP_REACH_M = 0.004
 _ROI_DISC_M = 0.0002
 _BED_HALF_M = 0.25
 _BED_HALF_THICKNESS_M = 0.02
@@ -48,7 +47,7 @@ class BulletWorld:
         self.tick_s = scene.tick_s
         self._scene = scene
         self._rng = rng
-        self._ticks = 0
+        self._clock = TickClock(scene.tick_s)
         self._steps = max(1, round(scene.tick_s / scene.simulation.bullet_step_s))
         self._command = HOLD
         with without_native_output():
@@ -67,7 +66,7 @@ class BulletWorld:
 
     @property
     def time_s(self) -> float:
-        return self._ticks * self.tick_s
+        return self._clock.time_s
 
     def observe(self) -> Observation:
         return self._latest
@@ -78,12 +77,7 @@ class BulletWorld:
         Raises:
             ValueError: an arm is unknown or a number is not finite.
         """
-        for arm, motion in command.arms.items():
-            if arm not in self._arms:
-                raise ValueError(f"no arm {arm!r}; this world has {', '.join(self._arms)}")
-            jaw = 0.0 if motion.jaw_rad is None else motion.jaw_rad
-            if not np.isfinite([*motion.linear_m_s, *motion.angular_rad_s, jaw]).all():
-                raise ValueError(f"the command for {arm} is not finite: {motion}")
+        command.require_valid(self._arms)
         self._command = command
 
     def step(self) -> None:
@@ -92,7 +86,7 @@ class BulletWorld:
         Raises:
             WorldError: the tissue exploded, or an arm was sent where it cannot go.
         """
-        self._ticks += 1
+        self._clock.tick()
         for name, arm in self._arms.items():
             arm.begin_tick(self._command.arms.get(name, ArmCommand()), self.tick_s)
             self._update_grip(arm)
@@ -117,7 +111,7 @@ class BulletWorld:
 
     def _update_grip(self, arm: BulletArm) -> None:
         """A jaw that closes from wide open on tissue takes it; one that opens lets go."""
-        if arm.jaw_rad > 0.75 * JAW_OPEN_RAD:
+        if arm.jaw_rad > ARMED_ABOVE_RAD:
             arm.armed = True
         if arm.anchors and arm.jaw_rad > JAW_ON_TISSUE_RAD + 1e-9:
             self._tissue.let_go(arm.anchors)
@@ -125,7 +119,7 @@ class BulletWorld:
         elif arm.armed and not arm.anchors and arm.jaw_rad <= JAW_ON_TISSUE_RAD:
             arm.armed = False
             tip_m = arm.measured().position_m
-            if distance_to_upper_m(self._tissue.surface(), tip_m) < GRASP_REACH_M:
+            if meets_tissue(self._tissue.surface(), tip_m):
                 nodes = self._tissue.patch_at(tip_m)
                 arm.anchors = self._tissue.grip(arm.grip, arm.carry(), nodes)
                 arm.jaw_rad = JAW_ON_TISSUE_RAD
@@ -145,20 +139,13 @@ class BulletWorld:
             name: arm.observe(time_s) for name, arm in self._arms.items()
         }
         update = replace(self._latest, time_s=time_s, arms=arms)
-        if self._due(scene.depth_camera.period_s):
+        if self._clock.due(scene.depth_camera.period_s):
             picture = take_picture(self._client, scene.depth_camera, time_s, self._rng)
             update = replace(update, depth_image=picture)
-        if self._due(scene.endoscope.period_s):
+        if self._clock.due(scene.endoscope.period_s):
             picture = take_picture(self._client, scene.endoscope, time_s, None)
             update = replace(update, endoscope_image=picture)
         self._latest = update
-
-    def _due(self, period_s: float) -> bool:
-        """Whether a multiple of ``period_s`` lies in the tick that just passed."""
-        if self._ticks == 0:
-            return True
-        periods = np.floor(np.array([self._ticks - 1, self._ticks]) * self.tick_s / period_s + 1e-6)
-        return bool(periods[1] > periods[0])
 
     def _lay_bed(self) -> None:
         """The bed, which tissue cannot pass, and the region on it, which is only seen."""

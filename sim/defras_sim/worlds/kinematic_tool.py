@@ -16,7 +16,8 @@ POINTING_DOWN = np.diag([1.0, -1.0, -1.0])
 JAW_SPEED_RAD_S = 4.0
 JAW_ON_TISSUE_RAD = 0.15
 """Angle at which a jaw that closes on tissue stops; above it, an opening jaw lets go."""
-_ARMED_ABOVE_RAD = 0.75 * JAW_OPEN_RAD
+ARMED_ABOVE_RAD = 0.75 * JAW_OPEN_RAD
+"""Only a jaw that was wider open than this takes tissue when it closes."""
 
 
 @dataclass
@@ -59,7 +60,7 @@ class KinematicTool:
             return not self.grasped
         meets = self._armed and turned <= JAW_ON_TISSUE_RAD < self.jaw_rad
         self.jaw_rad = float(turned)
-        self._armed = turned > _ARMED_ABOVE_RAD or (self._armed and turned > JAW_ON_TISSUE_RAD)
+        self._armed = turned > ARMED_ABOVE_RAD or (self._armed and turned > JAW_ON_TISSUE_RAD)
         if meets and on_tissue(self.tissue_from_tip):
             self.jaw_rad, self.grasped = JAW_ON_TISSUE_RAD, True
         return self.grasped

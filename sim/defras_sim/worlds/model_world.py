@@ -13,8 +13,9 @@ from defras_sim.geometry import Pose
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
 from defras_sim.tissue.model import TissueModel
+from defras_sim.worlds.clock import TickClock
 from defras_sim.worlds.error import WorldError
-from defras_sim.worlds.jaw_contact import distance_to_upper_m
+from defras_sim.worlds.jaw_contact import meets_tissue
 from defras_sim.worlds.kinematic_tool import KinematicTool
 from defras_sim.worlds.protocol import (
     HOLD,
@@ -25,8 +26,6 @@ from defras_sim.worlds.protocol import (
     PointCloud,
 )
 
-# A jaw reaches this far around its tip.
-GRASP_REACH_M = 0.004
 # Joint encoders resolve the tip to a few hundredths of a millimetre.
 TIP_NOISE_SD_M = 2e-5
 
@@ -44,7 +43,7 @@ class ModelWorld:
         self.tick_s = scene.tick_s
         self._scene = scene
         self._rng = rng
-        self._ticks = 0
+        self._clock = TickClock(scene.tick_s)
         self._command = HOLD
         self._closed = False
         self._tools = {
@@ -59,7 +58,7 @@ class ModelWorld:
 
     @property
     def time_s(self) -> float:
-        return self._ticks * self.tick_s
+        return self._clock.time_s
 
     def observe(self) -> Observation:
         return self._latest
@@ -70,12 +69,7 @@ class ModelWorld:
         Raises:
             ValueError: an arm is unknown or a number is not finite.
         """
-        for arm, motion in command.arms.items():
-            if arm not in self._tools:
-                raise ValueError(f"no arm {arm!r}; this world has {', '.join(self._tools)}")
-            jaw = 0.0 if motion.jaw_rad is None else motion.jaw_rad
-            if not np.isfinite([*motion.linear_m_s, *motion.angular_rad_s, jaw]).all():
-                raise ValueError(f"the command for {arm} is not finite: {motion}")
+        command.require_valid(self._tools)
         if not self._closed:
             self._command = command
 
@@ -85,7 +79,7 @@ class ModelWorld:
         Raises:
             WorldError: the tissue has no equilibrium that can be followed.
         """
-        self._ticks += 1
+        self._clock.tick()
         changed = False
         for arm, tool in self._tools.items():
             held = tool.grasped
@@ -114,7 +108,7 @@ class ModelWorld:
         self._command = HOLD
 
     def _on_tissue(self, tissue_from_tip: Pose) -> bool:
-        return distance_to_upper_m(self._state.surface, tissue_from_tip.position_m) < GRASP_REACH_M
+        return meets_tissue(self._state.surface, tissue_from_tip.position_m)
 
     def _settle(self) -> None:
         tips: dict[str, Pose] = {
@@ -133,8 +127,8 @@ class ModelWorld:
         """Read every sensor that is due; the others keep their last reading."""
         scene, latest = self._scene, self._latest
         update = replace(latest, time_s=self.time_s, arms=self._read_arms())
-        cloud_due = self._due(scene.depth_camera.period_s)
-        picture_due = self._due(scene.endoscope.period_s)
+        cloud_due = self._clock.due(scene.depth_camera.period_s)
+        picture_due = self._clock.due(scene.endoscope.period_s)
         if cloud_due or picture_due:
             surface = self._state.surface
             tissue = RayCaster(surface)
@@ -158,10 +152,3 @@ class ModelWorld:
             jaw_rad=tool.jaw_rad,
             grasped=tool.grasped,
         )
-
-    def _due(self, period_s: float) -> bool:
-        """Whether a multiple of ``period_s`` lies in the tick that just passed."""
-        if self._ticks == 0:
-            return True
-        periods = np.floor(np.array([self._ticks - 1, self._ticks]) * self.tick_s / period_s + 1e-6)
-        return bool(periods[1] > periods[0])

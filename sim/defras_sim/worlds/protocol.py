@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -84,12 +84,30 @@ class ArmCommand:
     angular_rad_s: Floats = field(default_factory=lambda: np.zeros(3))
     jaw_rad: float | None = None
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether every number in it is one."""
+        jaw_rad = 0.0 if self.jaw_rad is None else self.jaw_rad
+        return bool(np.isfinite([*self.linear_m_s, *self.angular_rad_s, jaw_rad]).all())
+
 
 @dataclass(frozen=True)
 class Command:
     """One command per arm; an arm that is not named holds still with its grip as it is."""
 
     arms: Mapping[str, ArmCommand] = field(default_factory=dict)
+
+    def require_valid(self, known_arms: Collection[str]) -> None:
+        """Refuse what a world must not carry out.
+
+        Raises:
+            ValueError: an arm is unknown or a number is not finite.
+        """
+        for arm, motion in self.arms.items():
+            if arm not in known_arms:
+                raise ValueError(f"no arm {arm!r}; this world has {', '.join(known_arms)}")
+            if not motion.is_finite:
+                raise ValueError(f"the command for {arm} is not finite: {motion}")
 
 
 HOLD = Command()
