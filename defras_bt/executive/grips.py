@@ -8,7 +8,6 @@ from typing import Protocol
 import numpy as np
 
 from defras_bt.executive.blackboard import Blackboard, Grip
-from defras_bt.planning.facts import grid_points
 from defras_bt.planning.plan import GridPoint
 from defras_sim.geometry import Pose
 from defras_sim.scene import Scene
@@ -67,6 +66,6 @@ class GripTracker:
             return self._board.at[arm]
         scene = self._twin.scene
         return min(
-            grid_points(scene),
+            scene.grasp_points,
             key=lambda point: float(np.linalg.norm(scene.grasp_xy_m(*point) - tip.position_m[:2])),
         )

@@ -15,26 +15,12 @@ from defras_sim.scene import Scene
 _SIDES = {"+y": "plus", "-y": "minus"}
 
 
-def grid_points(scene: Scene) -> tuple[GridPoint, ...]:
-    """All grasp points, row by row from (1, 1)."""
-    grid = scene.grasp
-    return tuple((c, r) for r in range(1, grid.rows + 1) for c in range(1, grid.columns + 1))
-
-
-def reaching_arms(scene: Scene, point: GridPoint) -> tuple[str, ...]:
-    """The arms on whose side of the x-z plane the point lies; both if it lies on the plane."""
-    y_mm = _mm_outwards(scene.grasp_xy_m(*point)[1])
-    return tuple(
-        name for name, arm in scene.arms.items() if (y_mm >= 0 if arm.side == "+y" else y_mm <= 0)
-    )
-
-
 def roi_distances_mm(scene: Scene) -> dict[GridPoint, int]:
     """From each grasp point to the centre of the region of interest, in the tissue plane."""
     center = scene.roi_center_m[:2]
     return {
         point: round(1000 * float(np.linalg.norm(scene.grasp_xy_m(*point) - center)))
-        for point in grid_points(scene)
+        for point in scene.grasp_points
     }
 
 
@@ -55,7 +41,7 @@ def attachment_distances_mm(scene: Scene, attached: NDArray[np.bool_]) -> dict[G
         point: round(
             1000 * float(np.linalg.norm(held_xy_m - scene.grasp_xy_m(*point), axis=1).min())
         )
-        for point in grid_points(scene)
+        for point in scene.grasp_points
     }
 
 
@@ -66,7 +52,7 @@ def scene_facts(scene: Scene) -> str:
         for rank, (name, arm) in enumerate(sorted(scene.arms.items()), start=1)
     ]
     to_roi = roi_distances_mm(scene)
-    for rank, point in enumerate(grid_points(scene)):
+    for rank, point in enumerate(scene.grasp_points):
         x_mm, y_mm = (_mm_outwards(value) for value in scene.grasp_xy_m(*point))
         place = _text(point)
         lines.append(f"grasp_point({place},{x_mm},{y_mm}).")

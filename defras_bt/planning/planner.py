@@ -18,8 +18,6 @@ from defras_bt.planning.english import (
 from defras_bt.planning.facts import (
     attachment_distances_mm,
     belief_facts,
-    grid_points,
-    reaching_arms,
     require_valid,
     roi_distances_mm,
     scene_facts,
@@ -132,8 +130,8 @@ class Planner:
         core = self._program.conflict(self.max_horizon, removable, self.budget_s)
         if core is None:
             raise RuntimeError("a plan exists that the ascending search did not find")
-        sentences = list(obstacle_sentences(core, len(grid_points(self.scene))))
-        if required is not None and not reaching_arms(self.scene, required):
+        sentences = list(obstacle_sentences(core, len(self.scene.grasp_points)))
+        if required is not None and not self.scene.arms_at(*required):
             sentences.append(
                 f"{point_text(required)} lies on the side of the x-z plane that no arm reaches; "
                 f"this scene has {', '.join(sorted(self.scene.arms))}"

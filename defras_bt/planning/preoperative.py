@@ -14,7 +14,6 @@ import numpy as np
 from joblib import Parallel, delayed, parallel_config
 
 from defras_bt.planning.english import point_text
-from defras_bt.planning.facts import grid_points, reaching_arms
 from defras_bt.planning.plan import ArmSituation, GridPoint, Plan, Situation
 from defras_bt.planning.planner import Planner
 from defras_bt.planning.scene_hash import scene_hash
@@ -173,7 +172,7 @@ def _rehearse_point(scene: Scene, point: GridPoint, step_m: float) -> list[Execu
 
 
 def _reachable_points(scene: Scene) -> tuple[GridPoint, ...]:
-    return tuple(point for point in grid_points(scene) if reaching_arms(scene, point))
+    return tuple(point for point in scene.grasp_points if scene.arms_at(*point))
 
 
 def _why_none(executions: Sequence[Execution], visibility: float, limit_n: float) -> str:

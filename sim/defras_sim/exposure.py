@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from defras_sim.retraction import SEQUENCES, GraspPoint, Rehearsal, Rehearser
-from defras_sim.scene import Scene
+from defras_sim.retraction import SEQUENCES, Rehearsal, Rehearser
+from defras_sim.scene import GraspPoint, Scene
 
 # A coarse mesh and long steps find the promising retractions in a third of the time.
 SCREENING_ELEMENTS_XYZ = (6, 6, 1)
@@ -21,13 +21,8 @@ VISIBILITY_MARGIN = 0.05
 PAPER_FORCE_N = 0.3
 
 
-def grasp_points(scene: Scene) -> list[GraspPoint]:
+def promising_points(scene: Scene) -> list[GraspPoint]:
     """All grasp points, the most promising first: far from attachments, close to the region."""
-    points = [
-        (column, row)
-        for row in range(1, scene.grasp.rows + 1)
-        for column in range(1, scene.grasp.columns + 1)
-    ]
     held_xy_m = scene.holes_xy_m[scene.attached]
 
     def promise_m(point: GraspPoint) -> float:
@@ -36,7 +31,7 @@ def grasp_points(scene: Scene) -> list[GraspPoint]:
         from_region = np.linalg.norm(scene.roi_center_m[:2] - xy_m)
         return float(np.round(from_held - from_region, 9))
 
-    return sorted(points, key=lambda point: (-promise_m(point), point))
+    return sorted(scene.grasp_points, key=lambda point: (-promise_m(point), point))
 
 
 def best_rehearsals(scene: Scene, points: Sequence[GraspPoint]) -> Iterator[Rehearsal]:
@@ -70,7 +65,7 @@ def find_exposing(scene: Scene, most_points: int = 10) -> Rehearsal | None:
     )
     reality = on_mesh(stricter, scene.simulation.elements_xyz)
     coarse = on_mesh(stricter, SCREENING_ELEMENTS_XYZ)
-    for found in best_rehearsals(coarse, grasp_points(scene)[:most_points]):
+    for found in best_rehearsals(coarse, promising_points(scene)[:most_points]):
         if found.best_visibility >= wanted and found.force_max_n <= force_n:
             rehearser = Rehearser(reality, step_m=SCREENING_STEP_M, stop_when_exposed=True)
             confirmed = rehearser.run(found.point, found.manoeuvres)
@@ -81,7 +76,7 @@ def find_exposing(scene: Scene, most_points: int = 10) -> Rehearsal | None:
 
 def exposure_map(scene: Scene) -> Mapping[GraspPoint, Rehearsal]:
     """The best rehearsal of every grasp point, on the coarse mesh."""
-    points = grasp_points(scene)
+    points = promising_points(scene)
     coarse = on_mesh(scene, SCREENING_ELEMENTS_XYZ)
     return dict(zip(points, best_rehearsals(coarse, points), strict=True))
 

@@ -11,15 +11,13 @@ from defras_sim.camera.ray_caster import RayCaster
 from defras_sim.camera.visibility import roi_visibility
 from defras_sim.geometry import Floats, Pose
 from defras_sim.motion import manoeuvre_target_m
-from defras_sim.scene import ArmName, Scene
+from defras_sim.scene import ArmName, GraspPoint, Scene
 from defras_sim.tissue.model import TissueModel, TissueSnapshot
 from defras_sim.tissue.state import TissueState
 from defras_sim.worlds.kinematic_tool import POINTING_DOWN
 
 # Looser than the twin's: forces stay within 0.1 %, and a rehearsal takes two thirds of the time.
 _RESIDUAL_SHARE = 1e-3
-
-GraspPoint = tuple[int, int]
 
 SEQUENCES: tuple[tuple[str, ...], ...] = (
     ("pull",),
@@ -62,11 +60,11 @@ def arm_for(scene: Scene, point: GraspPoint) -> ArmName:
     Raises:
         ValueError: no arm of the scene works on that side.
     """
-    y_m = scene.grasp_xy_m(*point)[1]
-    for name, arm in scene.arms.items():
-        if (y_m if arm.side == "+y" else -y_m) >= -1e-9:
-            return name
-    raise ValueError(f"no arm works on the side of grasp point {point} (y = {y_m:.4f} m)")
+    arms = scene.arms_at(*point)
+    if not arms:
+        y_m = scene.grasp_xy_m(*point)[1]
+        raise ValueError(f"no arm works on the side of grasp point {point} (y = {y_m:.4f} m)")
+    return arms[0]
 
 
 def rehearse(

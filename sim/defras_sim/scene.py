@@ -7,30 +7,36 @@ the x-z plane divides the two arms' sides. In simulation it is also the world fr
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from defras_sim.geometry import Floats
-from defras_sim.yaml_source import Fault, InvalidFile, YamlSource, overlay, read_yaml
+from defras_sim.scene_faults import scene_faults
+from defras_sim.yaml_source import InvalidFile, read_extended
 
 Vector = tuple[float, float, float]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0)]
 
 MaterialName = Literal["corotational", "neo_hookean", "stable_neo_hookean"]
 ElementName = Literal["hexahedron20", "tetrahedron4"]
+
+GraspPoint = tuple[int, int]
+"""(column, row), both from 1 at the smallest x and y."""
+
+# Nearer to the plane between the arms' sides than this is on it.
+_ON_PLANE_M = 1e-9
 
 # A hole that holds is a spring this stiff; the tissue under a hole gives way near 40 N/m.
 RIGID_HOLE_N_PER_M = 1e4
 
 
 class Part(BaseModel):
-    """Base of every part of a scene: unknown keys are errors, values never change."""
+    """Base of every part of a scene: unknown keys and NaN are faults, nothing ever changes."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Tissue(Part):
@@ -74,8 +80,8 @@ class GraspGrid(Part):
 class Roi(Part):
     """The hidden region of interest: a disc on the bed, just under the tissue's lower face."""
 
-    center_x_m: Finite
-    center_y_m: Finite
+    center_x_m: float
+    center_y_m: float
     radius_m: Positive = 0.015
 
 
@@ -201,6 +207,21 @@ class Scene(Part):
         )
 
     @property
+    def grasp_points(self) -> tuple[GraspPoint, ...]:
+        """All grasp points, row by row from (1, 1)."""
+        grid = self.grasp
+        return tuple((c, r) for r in range(1, grid.rows + 1) for c in range(1, grid.columns + 1))
+
+    def arms_at(self, column: int, row: int) -> tuple[ArmName, ...]:
+        """The arms on whose side of the x-z plane a grasp point lies; on the plane, all."""
+        y_m = self.grasp_xy_m(column, row)[1]
+        return tuple(
+            name
+            for name, arm in self.arms.items()
+            if (y_m if arm.side == "+y" else -y_m) >= -_ON_PLANE_M
+        )
+
+    @property
     def roi_center_m(self) -> Floats:
         """Centre (3,) of the region of interest, 1 mm below the tissue's lower face."""
         return np.array(
@@ -240,84 +261,9 @@ def load_scene(file: Path) -> Scene:
     Raises:
         InvalidFile: with every fault as file:line:column.
     """
-    source = _read_extended(Path(file), ())
+    source = read_extended(Path(file))
     scene = source.validate(Scene)
-    faults = [source.fault(place, message) for place, message in _faults(scene)]
+    faults = [source.fault(place, message) for place, message in scene_faults(scene)]
     if faults:
         raise InvalidFile(faults)
     return scene
-
-
-def _read_extended(file: Path, seen: tuple[Path, ...]) -> YamlSource:
-    source = read_yaml(file)
-    if "extends" not in source.data:
-        return source
-    base = source.data.pop("extends")
-    if not isinstance(base, str):
-        raise InvalidFile([source.fault(("extends",), "extends: should name a scene file")])
-    target = (file.parent / base).resolve()
-    if target in seen or target == file.resolve():
-        raise InvalidFile([source.fault(("extends",), f"extends: {base} extends itself")])
-    if not target.is_file():
-        raise InvalidFile([source.fault(("extends",), f"extends: no scene file {base} beside it")])
-    return overlay(_read_extended(target, (*seen, file.resolve())), source)
-
-
-def _faults(scene: Scene) -> list[tuple[tuple[Any, ...], str]]:
-    """What the parts cannot see alone."""
-    found: list[tuple[tuple[Any, ...], str]] = []
-    tissue, roi, grid = scene.tissue, scene.roi, scene.grasp
-    nx, ny = scene.hole_counts
-    rows = scene.attachments.map
-    if nx < 1 or ny < 1:
-        message = (
-            f"attachments.hole_pitch_m: {scene.attachments.hole_pitch_m} leaves no hole under the "
-            f"tissue; at most {min(tissue.length_x_m, tissue.width_y_m)}"
-        )
-        return [(("attachments", "hole_pitch_m"), message)]
-    if len(rows) != ny:
-        found.append((("attachments", "map"), f"attachments.map: {len(rows)} rows, needs {ny}"))
-    for i, row in enumerate(rows):
-        if len(row) != nx or set(row) - {"#", "."}:
-            message = f"attachments.map.{i}: {row!r} should be {nx} characters, each # or ."
-            found.append((("attachments", "map", i), message))
-    if not any("#" in row for row in rows):
-        message = "attachments.map: no hole holds the tissue; mark at least one with #"
-        found.append((("attachments", "map"), message))
-    half = np.array([tissue.length_x_m, tissue.width_y_m]) / 2
-    for axis, center in (("x", roi.center_x_m), ("y", roi.center_y_m)):
-        limit = half["xy".index(axis)] - roi.radius_m
-        if abs(center) > limit + 1e-12:
-            message = (
-                f"roi.center_{axis}_m: {center} puts the region outside the tissue; "
-                f"valid is -{limit:.4f} to {limit:.4f} for radius {roi.radius_m}"
-            )
-            found.append((("roi", f"center_{axis}_m"), message))
-    if (
-        grid.margin_m + grid.patch_radius_m > half.min() + 1e-12
-        and max(grid.columns, grid.rows) > 1
-    ):
-        found.append((("grasp", "margin_m"), "grasp.margin_m: leaves no room for grasp points"))
-    delta = scene.thresholds.delta_m
-    if not delta[0] < delta[1] < delta[2]:
-        found.append((("thresholds", "delta_m"), "thresholds.delta_m: should increase"))
-    for place, counts in (
-        (("tissue", "elements_xyz"), tissue.elements_xyz),
-        (("simulation", "elements_xyz"), scene.simulation.elements_xyz),
-        (("simulation", "bullet_elements_xyz"), scene.simulation.bullet_elements_xyz),
-    ):
-        if min(counts) < 1:
-            found.append((place, f"{'.'.join(place)}: each count should be 1 or more"))
-    if not scene.arms:
-        found.append((("arms",), "arms: needs at least one arm; valid: psm1, psm2"))
-    for name, camera in (("endoscope", scene.endoscope), ("depth_camera", scene.depth_camera)):
-        if np.hypot(*np.subtract(camera.target_m, camera.position_m)[:2]) < 1e-6:
-            message = f"{name}: looks straight up or down; move position_m or target_m sideways"
-            found.append(((name, "position_m"), message))
-    for i, adopted in enumerate(scene.model.effects):
-        message = f"model.effects.{i}: effect {adopted.effect!r} is unknown; available: none yet"
-        found.append((("model", "effects", i), message))
-    return found
-
-
-__all__ = ["Fault", "InvalidFile", "Scene", "load_scene"]

@@ -76,22 +76,21 @@ def _draw_holes(axes: Axes, scene: Scene, actual: Scene | None) -> None:
 
 
 def _draw_grasp_points(axes: Axes, scene: Scene) -> None:
-    for column in range(1, scene.grasp.columns + 1):
-        for row in range(1, scene.grasp.rows + 1):
-            x, y = 1e3 * scene.grasp_xy_m(column, row)
-            arms = [a for a, p in scene.arms.items() if (y if p.side == "+y" else -y) >= -1e-9]
-            colour = ARM_COLOURS[arms[0]] if len(arms) == 1 else "black"
-            axes.plot(x, y, "+", color=colour, ms=9, mew=2, zorder=4)
-            axes.annotate(
-                f"{column},{row}",
-                (x, y),
-                xytext=(4, 4),
-                textcoords="offset points",
-                fontsize=8.5,
-                color=colour,
-                bbox={"fc": "white", "ec": "none", "alpha": 0.6, "pad": 0.5},
-                zorder=4,
-            )
+    for column, row in scene.grasp_points:
+        x, y = 1e3 * scene.grasp_xy_m(column, row)
+        arms = scene.arms_at(column, row)
+        colour = ARM_COLOURS[arms[0]] if len(arms) == 1 else "black"
+        axes.plot(x, y, "+", color=colour, ms=9, mew=2, zorder=4)
+        axes.annotate(
+            f"{column},{row}",
+            (x, y),
+            xytext=(4, 4),
+            textcoords="offset points",
+            fontsize=8.5,
+            color=colour,
+            bbox={"fc": "white", "ec": "none", "alpha": 0.6, "pad": 0.5},
+            zorder=4,
+        )
 
 
 def _draw_direction(axes: Axes, name: str, camera: Camera, reach: float) -> None:

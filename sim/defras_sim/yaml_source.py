@@ -98,6 +98,30 @@ def read_yaml(file: Path) -> YamlSource:
     return YamlSource(file, data, places)
 
 
+def read_extended(file: Path) -> YamlSource:
+    """Read a file; with ``extends: other.yaml`` it is laid over the other one in the same folder.
+
+    Raises:
+        InvalidFile: a file cannot be read, or extends nothing that is there, or itself.
+    """
+    return _read_extended(file, ())
+
+
+def _read_extended(file: Path, seen: tuple[Path, ...]) -> YamlSource:
+    source = read_yaml(file)
+    if "extends" not in source.data:
+        return source
+    base = source.data.pop("extends")
+    if not isinstance(base, str):
+        raise InvalidFile([source.fault(("extends",), "extends: should name a scene file")])
+    target = (file.parent / base).resolve()
+    if target in seen or target == file.resolve():
+        raise InvalidFile([source.fault(("extends",), f"extends: {base} extends itself")])
+    if not target.is_file():
+        raise InvalidFile([source.fault(("extends",), f"extends: no scene file {base} beside it")])
+    return overlay(_read_extended(target, (*seen, file.resolve())), source)
+
+
 def overlay(base: YamlSource, top: YamlSource) -> YamlSource:
     """``base`` with the mappings of ``top`` laid over it, key by key; lists are replaced whole."""
     places = {key: place for key, place in base.places.items() if not _replaced(key, top.data)}

@@ -1,0 +1,95 @@
+"""What is wrong with a scene whose parts are each well-formed: they must fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from defras_sim.yaml_source import Location
+
+if TYPE_CHECKING:
+    from defras_sim.scene import Scene
+
+SceneFault = tuple[Location, str]
+"""Where in the file, and what is wrong with it and what would be valid."""
+
+_ROUNDING_M = 1e-12
+
+
+def scene_faults(scene: Scene) -> Iterator[SceneFault]:
+    """Every fault of ``scene``; none if it can be used."""
+    nx, ny = scene.hole_counts
+    if nx < 1 or ny < 1:
+        pitch_m, tissue = scene.attachments.hole_pitch_m, scene.tissue
+        yield (
+            ("attachments", "hole_pitch_m"),
+            f"attachments.hole_pitch_m: {pitch_m} leaves no hole under the tissue; at most "
+            f"{min(tissue.length_x_m, tissue.width_y_m)}",
+        )
+        return  # the map cannot be judged
+    yield from _attachment_faults(scene)
+    yield from _place_faults(scene)
+    yield from _mesh_faults(scene)
+    yield from _setup_faults(scene)
+
+
+def _attachment_faults(scene: Scene) -> Iterator[SceneFault]:
+    nx, ny = scene.hole_counts
+    rows = scene.attachments.map
+    if len(rows) != ny:
+        yield ("attachments", "map"), f"attachments.map: {len(rows)} rows, needs {ny}"
+    for i, row in enumerate(rows):
+        if len(row) != nx or set(row) - {"#", "."}:
+            message = f"attachments.map.{i}: {row!r} should be {nx} characters, each # or ."
+            yield ("attachments", "map", i), message
+    if not any("#" in row for row in rows):
+        message = "attachments.map: no hole holds the tissue; mark at least one with #"
+        yield ("attachments", "map"), message
+
+
+def _place_faults(scene: Scene) -> Iterator[SceneFault]:
+    """Region and grasp points have to lie on the tissue."""
+    roi, grid = scene.roi, scene.grasp
+    half_m = np.array([scene.tissue.length_x_m, scene.tissue.width_y_m]) / 2
+    for axis, center_m, most_m in zip("xy", (roi.center_x_m, roi.center_y_m), half_m, strict=True):
+        limit_m = most_m - roi.radius_m
+        if abs(center_m) > limit_m + _ROUNDING_M:
+            yield (
+                ("roi", f"center_{axis}_m"),
+                f"roi.center_{axis}_m: {center_m} puts the region outside the tissue; "
+                f"valid is -{limit_m:.4f} to {limit_m:.4f} for radius {roi.radius_m}",
+            )
+    room_m = float(half_m.min()) - grid.patch_radius_m
+    if grid.margin_m > room_m + _ROUNDING_M and max(grid.columns, grid.rows) > 1:
+        yield (
+            ("grasp", "margin_m"),
+            f"grasp.margin_m: {grid.margin_m} leaves no room for grasp points; at most "
+            f"{max(room_m, 0.0):.4f} for patch_radius_m {grid.patch_radius_m}",
+        )
+
+
+def _mesh_faults(scene: Scene) -> Iterator[SceneFault]:
+    for place, counts in (
+        (("tissue", "elements_xyz"), scene.tissue.elements_xyz),
+        (("simulation", "elements_xyz"), scene.simulation.elements_xyz),
+        (("simulation", "bullet_elements_xyz"), scene.simulation.bullet_elements_xyz),
+    ):
+        if min(counts) < 1:
+            yield place, f"{'.'.join(place)}: {list(counts)}; each count should be 1 or more"
+
+
+def _setup_faults(scene: Scene) -> Iterator[SceneFault]:
+    delta_m = scene.thresholds.delta_m
+    if not delta_m[0] < delta_m[1] < delta_m[2]:
+        yield ("thresholds", "delta_m"), f"thresholds.delta_m: {list(delta_m)} should increase"
+    if not scene.arms:
+        yield ("arms",), "arms: needs at least one arm; valid: psm1, psm2"
+    for name, camera in (("endoscope", scene.endoscope), ("depth_camera", scene.depth_camera)):
+        if np.hypot(*np.subtract(camera.target_m, camera.position_m)[:2]) < 1e-6:
+            message = f"{name}: looks straight up or down; move position_m or target_m sideways"
+            yield (name, "position_m"), message
+    for i, adopted in enumerate(scene.model.effects):
+        message = f"model.effects.{i}: effect {adopted.effect!r} is unknown; available: none yet"
+        yield ("model", "effects", i), message
