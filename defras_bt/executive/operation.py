@@ -25,7 +25,6 @@ from defras_bt.recording.versions import versions
 from defras_sim.retraction import GraspPoint, Rehearsal, Rehearser
 from defras_sim.scene import Scene
 from defras_sim.twin import Twin
-from defras_sim.worlds.bullet_world import BulletWorld
 from defras_sim.worlds.model_world import ModelWorld
 from defras_sim.worlds.protocol import World
 
@@ -124,6 +123,9 @@ def make_world(name: str, actual: Scene, rng: np.random.Generator) -> World:
     if name == "model":
         return ModelWorld(actual, rng)
     if name == "bullet":
+        # PyBullet is large and loads slowly; commands that need no such world do without it.
+        from defras_sim.worlds.bullet_world import BulletWorld
+
         return BulletWorld(actual, rng)
     raise ValueError(f"there is no world {name!r}; there are: {', '.join(WORLDS)}")
 

@@ -9,8 +9,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pybullet
-from pybullet_utils.bullet_client import BulletClient
 
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
@@ -22,7 +20,7 @@ from defras_sim.worlds.colours import BED, ROI
 from defras_sim.worlds.error import WorldError
 from defras_sim.worlds.jaw_contact import meets_tissue
 from defras_sim.worlds.kinematic_tool import ARMED_ABOVE_RAD, JAW_ON_TISSUE_RAD
-from defras_sim.worlds.native_output import without_native_output
+from defras_sim.worlds.native_output import STDERR, without_native_output
 from defras_sim.worlds.protocol import (
     HOLD,
     ArmCommand,
@@ -30,6 +28,10 @@ from defras_sim.worlds.protocol import (
     Command,
     Observation,
 )
+
+with without_native_output(STDERR):
+    import pybullet
+    from pybullet_utils.bullet_client import BulletClient
 
 _ROI_DISC_M = 0.0002
 _BED_HALF_M = 0.25

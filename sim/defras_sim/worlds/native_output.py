@@ -7,21 +7,23 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+STDOUT, STDERR = 1, 2
+
 
 @contextmanager
-def without_native_output() -> Iterator[None]:
-    """Whatever C code prints to standard output meanwhile is dropped; exceptions pass through.
+def without_native_output(descriptor: int = STDOUT) -> Iterator[None]:
+    """Whatever C code prints to ``descriptor`` meanwhile is dropped; exceptions pass through.
 
-    PyBullet prints counts and names whenever it loads a body, which would spoil output that
-    programs read.
+    PyBullet prints its build time to standard error when imported, and counts and names to standard
+    output whenever it loads a body, which would spoil output that programs read.
     """
-    sys.stdout.flush()
-    kept = os.dup(1)
+    (sys.stdout if descriptor == STDOUT else sys.stderr).flush()
+    kept = os.dup(descriptor)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 1)
+        os.dup2(nowhere, descriptor)
         yield
     finally:
-        os.dup2(kept, 1)
+        os.dup2(kept, descriptor)
         os.close(kept)
         os.close(nowhere)
