@@ -11,9 +11,9 @@ from defras_bt.learning.adoption import AdoptionRule, Hearing, distances_m
 from defras_bt.learning.cost import SearchSettings
 from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
 from defras_bt.learning.hold_out import Split, split
-from defras_bt.learning.replay import NotRepeatable, Replay, hole_stiffness_n_per_m
+from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_bt.learning.search import AttachmentSearch, Mask, SearchResult
-from defras_sim.scene import Scene
+from defras_sim.scene import Scene, hole_stiffness_n_per_m
 from defras_sim.tissue.state import TissueState
 
 

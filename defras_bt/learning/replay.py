@@ -9,15 +9,10 @@ from numpy.typing import NDArray
 
 from defras_bt.learning.estimate import Keyframe
 from defras_sim.geometry import Floats, Pose
-from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene
+from defras_sim.scene import Scene
 from defras_sim.tissue.hole_response import HoleResponse
 from defras_sim.tissue.model import NothingToGrasp, TissueModel, TissueSnapshot
 from defras_sim.tissue.state import TissueState
-
-
-def hole_stiffness_n_per_m(attached: NDArray[np.bool_]) -> Floats:
-    """Stiffness (holes,) of holes that hold or are free."""
-    return np.where(attached, RIGID_HOLE_N_PER_M, 0.0)
 
 
 class NotRepeatable(RuntimeError):

@@ -17,9 +17,9 @@ from defras_bt.learning.cost import Cost, SearchSettings
 from defras_bt.learning.linearised import Indices, LinearisedFrame
 from defras_bt.learning.misfit import Misfit, misfit
 from defras_bt.learning.observed_cells import ObservedCells
-from defras_bt.learning.replay import NotRepeatable, Replay, hole_stiffness_n_per_m
+from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_sim.geometry import Floats
-from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene
+from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene, hole_stiffness_n_per_m
 from defras_sim.surface import Surface
 
 Mask = NDArray[np.bool_]

@@ -33,6 +33,11 @@ _ON_PLANE_M = 1e-9
 RIGID_HOLE_N_PER_M = 1e4
 
 
+def hole_stiffness_n_per_m(attached: NDArray[np.bool_]) -> Floats:
+    """Stiffness (holes,) of holes that hold or are free."""
+    return np.where(attached, RIGID_HOLE_N_PER_M, 0.0)
+
+
 class Part(BaseModel):
     """Base of every part of a scene: unknown keys and NaN are faults, nothing ever changes."""
 

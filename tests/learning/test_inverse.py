@@ -10,10 +10,10 @@ import pytest
 
 from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
 from defras_bt.learning.inverse import InverseEstimator
-from defras_bt.learning.replay import Replay, hole_stiffness_n_per_m
+from defras_bt.learning.replay import Replay
 from defras_bt.monitoring.local import LocalMetric
 from defras_bt.monitoring.seen import seen_surface
-from defras_sim.scene import Scene
+from defras_sim.scene import Scene, hole_stiffness_n_per_m
 
 Record = Callable[[int], list[Keyframe]]
 

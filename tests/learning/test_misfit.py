@@ -10,9 +10,9 @@ import pytest
 from defras_bt.learning.estimate import Keyframe
 from defras_bt.learning.misfit import misfit
 from defras_bt.learning.observed_cells import ObservedCells
-from defras_bt.learning.replay import NotRepeatable, Replay, hole_stiffness_n_per_m
+from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_sim.geometry import Pose
-from defras_sim.scene import Scene
+from defras_sim.scene import Scene, hole_stiffness_n_per_m
 
 Record = Callable[[int], list[Keyframe]]
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from defras_bt.learning.estimate import Keyframe
 from defras_bt.learning.registration import fitted_registration
-from defras_bt.learning.replay import Replay, hole_stiffness_n_per_m
+from defras_bt.learning.replay import Replay
 from defras_sim.geometry import Pose
-from defras_sim.scene import Scene
+from defras_sim.scene import Scene, hole_stiffness_n_per_m
 
 
 def test_a_shift_and_a_turn_are_undone(

@@ -9,11 +9,11 @@ import pytest
 
 from defras_bt.learning.cost import Cost, SearchSettings
 from defras_bt.learning.estimate import Keyframe
-from defras_bt.learning.replay import NotRepeatable, Replay, hole_stiffness_n_per_m
+from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_bt.learning.search import AttachmentSearch
 from defras_sim.camera.depth import depth_cloud_m
 from defras_sim.camera.ray_caster import RayCaster
-from defras_sim.scene import Scene
+from defras_sim.scene import Scene, hole_stiffness_n_per_m
 
 MESH = (6, 6, 1)
 

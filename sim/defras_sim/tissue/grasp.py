@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -142,3 +143,16 @@ def nearest_on_upper_face(
             f"face; a grasp needs at most {1e3 * GRASP_REACH_M:.0f} mm"
         )
     return best
+
+
+def at_rest(grasps: Mapping[str, Grasp]) -> dict[str, Grasp]:
+    """The same grasps where they do not deform the tissue."""
+    return {
+        arm: replace(grasp, tissue_from_tip=grasp.tissue_from_rest_tip)
+        for arm, grasp in grasps.items()
+    }
+
+
+def spring_order(grasps: Mapping[str, Grasp]) -> list[tuple[str, int]]:
+    """Which springs hold, in which order: equal if the same energy describes them."""
+    return [(arm, id(grasp.springs)) for arm, grasp in grasps.items()]

@@ -8,18 +8,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from defras_sim.geometry import Floats, Pose
-from defras_sim.scene import RIGID_HOLE_N_PER_M, ElementName, MaterialName, Scene
+from defras_sim.scene import ElementName, MaterialName, Scene
 from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.bed import bed_under
 from defras_sim.tissue.equilibrium import PotentialEnergy
-from defras_sim.tissue.grasp import Grasp, NothingToGrasp, grasped_patch, nearest_on_upper_face
+from defras_sim.tissue.grasp import (
+    Grasp,
+    NothingToGrasp,
+    at_rest,
+    grasped_patch,
+    nearest_on_upper_face,
+    spring_order,
+)
 from defras_sim.tissue.hole_response import HoleResponse
+from defras_sim.tissue.holes import Holes
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import Integers, slab_mesh
 from defras_sim.tissue.path import Trail, between, length_m, markers_m
 from defras_sim.tissue.readout import tissue_state
 from defras_sim.tissue.solver import NewtonSettings, NewtonSolver, Solution
-from defras_sim.tissue.springs import ROWS, Springs, disc_rows, joined, slopes_by_stiffness
+from defras_sim.tissue.springs import ROWS, joined
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.surface import surface_map
 
@@ -63,11 +71,7 @@ class TissueModel:
         self._body = ElasticBody(self.mesh, name, mu, lam)
         self._bed = bed_under(self.mesh, tissue) if tissue.bed else None
         self._surface = surface_map(self.mesh, tissue)
-        self._hole_rows = disc_rows(
-            self.mesh, scene.holes_xy_m, scene.attachments.hole_radius_m, -tissue.thickness_m
-        )
-        self._hole_targets_m = self._hole_rows @ self.mesh.nodes_m
-        self._hole_stiffness = np.where(scene.attached, RIGID_HOLE_N_PER_M, 0.0)
+        self._holes = Holes(self.mesh, scene)
         self._positions_m = self.mesh.nodes_m.copy()
         self._grasps: dict[str, Grasp] = {}
         self._trail = Trail()
@@ -77,7 +81,7 @@ class TissueModel:
     @property
     def hole_stiffness_n_per_m(self) -> Floats:
         """Stiffness of every hole (holes,), in the order of ``scene.holes_xy_m``."""
-        return self._hole_stiffness.copy()
+        return self._holes.stiffness_n_per_m
 
     def set_hole_stiffness(self, stiffness_n_per_m: Floats) -> None:
         """Give every hole its stiffness (holes,); zero is free.
@@ -85,15 +89,7 @@ class TissueModel:
         Raises:
             ValueError: wrong count, negative, or not finite.
         """
-        stiffness = np.array(stiffness_n_per_m, dtype=float)
-        if stiffness.shape != self._hole_stiffness.shape:
-            raise ValueError(
-                f"hole stiffness has shape {stiffness.shape}; the scene has "
-                f"{len(self._hole_stiffness)} holes"
-            )
-        if not np.all(np.isfinite(stiffness) & (stiffness >= 0)):
-            raise ValueError("hole stiffness should be finite and at least 0 N/m")
-        self._hole_stiffness = stiffness
+        self._holes.stiffness_n_per_m = stiffness_n_per_m
         self._changed()
 
     @property
@@ -142,7 +138,7 @@ class TissueModel:
 
     def restore(self, snapshot: TissueSnapshot) -> None:
         """Go back to ``snapshot``; the holes keep their present stiffness."""
-        others = _springs(snapshot.grasps) != _springs(self._grasps)
+        others = spring_order(snapshot.grasps) != spring_order(self._grasps)
         self._grasps = dict(snapshot.grasps)
         if others:
             self._changed()
@@ -163,34 +159,22 @@ class TissueModel:
         moving = length_m(self._tips(), tips) > 0
         converged, iterations = self._travel(tips)
         if not converged and not moving:
-            self._place(TissueSnapshot(self.mesh.nodes_m, _at_rest(self._grasps)))
+            self._place(TissueSnapshot(self.mesh.nodes_m, at_rest(self._grasps)))
             converged, more = self._travel(tips)
             iterations += more
             if not converged:
                 self._place(before)
         return self._state(converged, iterations)
 
-    def surface_sensitivity_to_holes(self, holes: Integers) -> Floats:
-        """Derivative (vertices, 3, len(holes)) [m per N/m] of the surface by the holes' stiffness.
-
-        At an equilibrium the gradient g(x, k) stays zero, so dx/dk = -K^-1 dg/dk.
-        """
-        x = self._positions_m
-        slopes = slopes_by_stiffness(self._hole_rows, self._hole_targets_m, x, holes)
-        change = -self._solver.solve_tangent(self._energy.tangent(x), slopes)
-        by_node = change.reshape(len(x), -1)
-        return (self._surface.from_nodes @ by_node).reshape(-1, 3, len(holes))
-
     def response_to_hole_forces(self, holes: Integers) -> HoleResponse:
         """Linear response of the surface and of ``holes`` to forces where ``holes`` hold."""
         x = self._positions_m
-        chosen = np.asarray(holes, dtype=np.int64)
-        rows = (ROWS * chosen[:, None] + np.arange(ROWS)).ravel()
-        on_holes = self._hole_rows[rows].toarray()
-        stretch = on_holes @ x - self._hole_targets_m[rows]
+        rows, targets_m = self._holes.rows_of(holes)
+        on_holes = rows.toarray()
+        stretch = on_holes @ x - targets_m
         motion = self._solver.solve_tangent(self._energy.tangent(x), np.kron(on_holes.T, np.eye(3)))
         by_node = motion.reshape(len(x), -1)
-        count, size = len(chosen), 3 * ROWS
+        count, size = len(holes), 3 * ROWS
         return HoleResponse(
             (self._surface.from_nodes @ by_node).reshape(-1, 3, count, size),
             (on_holes @ by_node).reshape(count, size, count, size),
@@ -203,13 +187,12 @@ class TissueModel:
         self._energy = self._assembled()
 
     def _assembled(self) -> PotentialEnergy:
-        springs = [Springs(self._hole_rows, np.repeat(self._hole_stiffness, ROWS))]
-        springs += [grasp.springs for grasp in self._grasps.values()]
+        springs = [self._holes.springs, *(grasp.springs for grasp in self._grasps.values())]
         return PotentialEnergy(self._body, joined(springs), self._targets_m(), self._bed)
 
     def _targets_m(self) -> Floats:
         held = [grasp.targets_m for grasp in self._grasps.values()]
-        return np.concatenate([self._hole_targets_m, *held])
+        return np.concatenate([self._holes.targets_m, *held])
 
     def _tips(self) -> dict[str, Pose]:
         return {arm: grasp.tissue_from_tip for arm, grasp in self._grasps.items()}
@@ -276,16 +259,3 @@ class TissueModel:
         return tissue_state(
             self._energy, self._positions_m, self._grasps, self._surface, converged, iterations
         )
-
-
-def _at_rest(grasps: Mapping[str, Grasp]) -> dict[str, Grasp]:
-    """The same grasps where they do not deform the tissue."""
-    return {
-        arm: replace(grasp, tissue_from_tip=grasp.tissue_from_rest_tip)
-        for arm, grasp in grasps.items()
-    }
-
-
-def _springs(grasps: Mapping[str, Grasp]) -> list[tuple[str, int]]:
-    """Which springs hold, in which order: equal if the same energy describes them."""
-    return [(arm, id(grasp.springs)) for arm, grasp in grasps.items()]

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from defras_sim.geometry import Floats
-from defras_sim.tissue.mesh import Integers, Mesh
+from defras_sim.tissue.mesh import Mesh
 
 # Seven-point rule of degree 5 for the mean over the unit disc (Radon 1948): the centre, and six
 # points on a circle.
@@ -87,15 +87,3 @@ def joined(parts: list[Springs]) -> Springs:
         sparse.csr_array(sparse.vstack([part.rows for part in parts], format="csr")),
         np.concatenate([part.stiffness_n_per_m for part in parts]),
     )
-
-
-def slopes_by_stiffness(
-    rows: sparse.csr_array, targets_m: Floats, positions_m: Floats, discs: Integers
-) -> Floats:
-    """Derivative (3 nodes, discs) of the energy's gradient by each disc's stiffness."""
-    stretch = rows @ positions_m - targets_m
-    columns = np.empty((positions_m.size, len(discs)))
-    for column, disc in enumerate(np.asarray(discs, dtype=np.int64)):
-        mine = slice(ROWS * disc, ROWS * (disc + 1))
-        columns[:, column] = (rows[mine].T @ stretch[mine]).ravel()
-    return columns

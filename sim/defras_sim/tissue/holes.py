@@ -1,0 +1,52 @@
+"""The holes of the lower face: where they hold the tissue, and how firmly."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from defras_sim.geometry import Floats
+from defras_sim.scene import Scene, hole_stiffness_n_per_m
+from defras_sim.tissue.mesh import Integers, Mesh
+from defras_sim.tissue.springs import ROWS, Springs, disc_rows
+
+
+class Holes:
+    """All holes of a scene on a mesh, in the order of ``scene.holes_xy_m``.
+
+    ``targets_m`` (3 holes, 3) is what their springs hold the tissue at: its shape at rest.
+    """
+
+    def __init__(self, mesh: Mesh, scene: Scene) -> None:
+        self._rows = disc_rows(
+            mesh, scene.holes_xy_m, scene.attachments.hole_radius_m, -scene.tissue.thickness_m
+        )
+        self.targets_m: Floats = self._rows @ mesh.nodes_m
+        self._stiffness = hole_stiffness_n_per_m(scene.attached)
+
+    @property
+    def stiffness_n_per_m(self) -> Floats:
+        """Stiffness of every hole (holes,); zero is free."""
+        return self._stiffness.copy()
+
+    @stiffness_n_per_m.setter
+    def stiffness_n_per_m(self, stiffness_n_per_m: Floats) -> None:
+        stiffness = np.array(stiffness_n_per_m, dtype=float)
+        if stiffness.shape != self._stiffness.shape:
+            raise ValueError(
+                f"hole stiffness has shape {stiffness.shape}; the scene has "
+                f"{len(self._stiffness)} holes"
+            )
+        if not np.all(np.isfinite(stiffness) & (stiffness >= 0)):
+            raise ValueError("hole stiffness should be finite and at least 0 N/m")
+        self._stiffness = stiffness
+
+    @property
+    def springs(self) -> Springs:
+        return Springs(self._rows, np.repeat(self._stiffness, ROWS))
+
+    def rows_of(self, holes: Integers) -> tuple[sparse.csr_array, Floats]:
+        """What some holes hold: rows (3 holes, nodes), and targets (3 holes, 3) of those."""
+        chosen = np.asarray(holes, dtype=np.int64)
+        rows = (ROWS * chosen[:, None] + np.arange(ROWS)).ravel()
+        return self._rows[rows], self.targets_m[rows]
