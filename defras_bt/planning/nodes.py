@@ -133,6 +133,8 @@ class Replan(PlanSource):
             try:
                 plan = self._plan(skipped)
             except NoPlan:
+                if best is None:
+                    raise
                 break
             point = _grasp_point(plan)
             seen, exposing = self._outlook(point)
@@ -141,9 +143,9 @@ class Replan(PlanSource):
             if seen >= self.context.scene.thresholds.roi_visibility:
                 break
             skipped |= {point}
-        if best is None:
-            return self._plan(frozenset())
-        return self._plan(frozenset(), best[2], best[1])
+        assert best is not None, "rehearse is 1 or more"
+        _, point, exposing = best
+        return self._plan(frozenset(), exposing, point)
 
     def _outlook(self, point: GridPoint) -> tuple[float, tuple[str, ...]]:
         """Best simulated visibility of a retraction at ``point`` within the force threshold.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -27,9 +29,9 @@ def opened() -> KinematicTool:
     return tool
 
 
-def close(tool: KinematicTool, on_tissue: object = always) -> None:
+def close(tool: KinematicTool, on_tissue: Callable[[Pose], bool] = always) -> None:
     for _ in range(10):
-        tool.step(ArmCommand(jaw_rad=JAW_CLOSED_RAD), TICK_S, on_tissue)  # type: ignore[arg-type]
+        tool.step(ArmCommand(jaw_rad=JAW_CLOSED_RAD), TICK_S, on_tissue)
 
 
 def test_it_integrates_the_commanded_velocity() -> None:
