@@ -16,6 +16,8 @@ SceneFault = tuple[Location, str]
 """Where in the file, and what is wrong with it and what would be valid."""
 
 _ROUNDING_M = 1e-12
+_MOST_ELEMENTS = 64
+"""Along one side. A mesh this fine already needs minutes for one step."""
 
 
 def scene_faults(scene: Scene) -> Iterator[SceneFault]:
@@ -76,8 +78,12 @@ def _mesh_faults(scene: Scene) -> Iterator[SceneFault]:
         (("simulation", "elements_xyz"), scene.simulation.elements_xyz),
         (("simulation", "bullet_elements_xyz"), scene.simulation.bullet_elements_xyz),
     ):
-        if min(counts) < 1:
-            yield place, f"{'.'.join(place)}: {list(counts)}; each count should be 1 or more"
+        if min(counts) < 1 or max(counts) > _MOST_ELEMENTS:
+            yield (
+                place,
+                f"{'.'.join(place)}: {list(counts)}; each count should be 1 or more, "
+                f"at most {_MOST_ELEMENTS}",
+            )
 
 
 def _setup_faults(scene: Scene) -> Iterator[SceneFault]:

@@ -83,6 +83,7 @@ def test_the_good_file_is_good(tmp_path: Path) -> None:
         (GOOD.replace("  map:", "  hole_pitch_m: 0.2\n  map:"), "6:3", ("hole_pitch_m", "0.12")),
         (GOOD + "tissue:\n  elements_xyz: [8, 0, 1]\n", "20:3", ("1 or more",)),
         (GOOD + "simulation:\n  elements_xyz: [8, 0, 1]\n", "20:3", ("1 or more",)),
+        (GOOD + "tissue:\n  elements_xyz: [8, 8000, 1]\n", "20:3", ("at most 64",)),
         (GOOD + "model:\n  effects:\n    - {effect: magic}\n", "21:7", ("'magic' is unknown",)),
         ("", "1:1", ("mapping",)),
         ("- a\n- b\n", "1:1", ("mapping",)),
