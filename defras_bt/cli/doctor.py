@@ -17,6 +17,7 @@ from rich.table import Table
 
 from defras_bt.cli.errors import ExitCode
 from defras_sim.resources import resource
+from defras_sim.worlds.native_output import STDERR, without_native_output
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Finding:
 IMPORT_NAMES = {
     "py-trees": "py_trees",
     "rerun-sdk": "rerun",
-    "ruamel.yaml": "ruamel.yaml",
+    "ruamel-yaml": "ruamel.yaml",
 }
 
 
@@ -69,6 +70,7 @@ def _packages() -> list[Finding]:
         if "extra ==" in requirement:
             continue
         name = re.split(r"[<>=!~;\[ ]", requirement, maxsplit=1)[0]
+        name = re.sub(r"[-_.]+", "-", name).lower()  # installers may write it either way
         remedy = f"pip install -c constraints.txt '{requirement}'"
         findings.append(Finding(f"package {name}", _importable(name), True, remedy))
     return findings
@@ -77,7 +79,8 @@ def _packages() -> list[Finding]:
 def _importable(name: str) -> str | None:
     """Version of a package that can really be imported, not only found."""
     try:
-        importlib.import_module(IMPORT_NAMES.get(name, name.replace("-", "_")))
+        with without_native_output(STDERR):
+            importlib.import_module(IMPORT_NAMES.get(name, name.replace("-", "_")))
         return importlib.metadata.version(name)
     except (ImportError, OSError):
         return None
@@ -98,7 +101,7 @@ def _data() -> list[Finding]:
 def _viewer() -> list[Finding]:
     apt = "apt-get install"
     return [
-        Finding("rerun viewer", shutil.which("rerun"), False, "pip install rerun-sdk"),
+        Finding("rerun viewer", _importable("rerun-sdk"), False, "pip install rerun-sdk"),
         Finding(
             "Vulkan (pictures of timelines without a screen)",
             ctypes.util.find_library("vulkan"),

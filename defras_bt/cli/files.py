@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from defras_bt.cli.errors import UserError
 from defras_sim.resources import resource
@@ -24,6 +25,20 @@ def find(named: str, folder: str, suffix: str = ".yaml") -> Path:
         return inside
     names = ", ".join(sorted(p.stem for p in shipped.glob(f"*{suffix}")))
     raise UserError(f"there is no file {named}; shipped with defras are: {names}")
+
+
+def folder_for(out: Path) -> Path:
+    """Make the folder ``out`` where it is missing, and see that files can be written there.
+
+    Raises:
+        UserError: they cannot.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=out):
+            return out
+    except OSError as error:
+        raise UserError(f"--out {out}: {error}; give a folder that can be written to") from error
 
 
 def find_scene(named: str) -> tuple[Path, Scene]:

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from defras_bt.cli.errors import UserError
-from defras_bt.cli.files import find_scene
+from defras_bt.cli.files import find_scene, folder_for
 from defras_bt.executive.operation import WORLDS
 from defras_bt.planning.english import plan_text
 from defras_bt.planning.plan_file import InvalidPlanFile, StalePlanFile, save_plan
@@ -34,6 +34,10 @@ def plan(
     if world not in WORLDS:
         raise UserError(f"--world {world}: valid are {', '.join(WORLDS)}")
     _, believed = find_scene(scene)
+    if out is not None:
+        folder_for(out.parent)  # before minutes of rehearsals, not after
+        if out.is_dir():
+            raise UserError(f"--out {out} is a folder; give the name of a file")
     console = Console(soft_wrap=True, highlight=False)
     prepared = rehearsed(believed.for_bullet() if world == "bullet" else believed, console, jobs)
     if prepared.result is None:
@@ -66,7 +70,9 @@ def rehearsed(
         MofNCompleteColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
         task = bar.add_task("rehearsing grasp points", total=None)
         try:
             return prepare(
@@ -76,7 +82,7 @@ def rehearsed(
                 jobs=jobs,
                 progress=lambda done, total: bar.update(task, completed=done, total=total),
             )
-        except (InvalidPlanFile, StalePlanFile, OSError) as error:
+        except (InvalidPlanFile, StalePlanFile) as error:
             raise UserError(f"--plan: {error}") from error
 
 

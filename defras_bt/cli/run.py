@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from defras_bt.cli.errors import OUTCOME_CODES, UserError
-from defras_bt.cli.files import find, find_scene
+from defras_bt.cli.files import find, find_scene, folder_for
 from defras_bt.cli.plan import rehearsed, tell
 from defras_bt.executive.operation import WORLDS, Operation, operate
 from defras_bt.executive.tree_file import read_tree
@@ -25,6 +25,7 @@ from defras_bt.recording.record import Recorder
 from defras_bt.recording.report import ReportRecorder
 from defras_bt.recording.summary import SummaryRecorder
 from defras_bt.recording.timeline import TimelineRecorder
+from defras_sim.scene import Scene
 
 
 def run(
@@ -53,9 +54,9 @@ def run(
         raise UserError(f"--world {world}: valid are {', '.join(WORLDS)}")
     scene_file, believed = find_scene(scene)
     actual_file, truth = find_scene(actual) if actual is not None else (None, believed)
-    if actual is not None and truth.hole_counts != believed.hole_counts:
-        raise UserError(f"{scene} and {actual} have different holes: they are not one patient")
+    _require_same_set_up(believed, truth)
     tree_file = find(tree, "trees")
+    recorded = file_recorders(out) if out is not None else ()
     console = Console(soft_wrap=True, highlight=False)
     prepared = rehearsed(
         believed.for_bullet() if world == "bullet" else believed,
@@ -77,9 +78,7 @@ def run(
         preoperative=prepared.plan,
         max_time_s=max_time,
     )
-    recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console)]
-    if out is not None:
-        recorders += file_recorders(out)
+    recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console), *recorded]
     asked: Callable[[Plan], bool] = _ask if approve else lambda plan: True
     with stop_on_interrupt() as operator_stop:
         summary = operate(operation, recorders, approve=asked, operator_stop=operator_stop)
@@ -94,10 +93,7 @@ def file_recorders(out: Path) -> list[Recorder]:
     Raises:
         UserError: the folder cannot be made.
     """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--out {out}: {error}") from error
+    folder_for(out)
     return [
         TimelineRecorder(out / "run.rrd"),
         BagRecorder(out / "recording.mcap"),
@@ -123,6 +119,34 @@ def stop_on_interrupt() -> Iterator[Callable[[], str | None]]:
         signal.signal(signal.SIGINT, before)
 
 
+def _require_same_set_up(believed: Scene, truth: Scene) -> None:
+    """What the executive takes for granted: one patient, one clock, the same arms.
+
+    Raises:
+        UserError: the actual scene is of another set-up.
+    """
+    if truth.hole_counts != believed.hole_counts:
+        raise UserError(
+            f"{believed.name} and {truth.name} have different holes "
+            f"({believed.hole_counts} and {truth.hole_counts}): they are not one patient"
+        )
+    for key in ("tick_s", "arms"):
+        if getattr(truth, key) != getattr(believed, key):
+            raise UserError(
+                f"{believed.name} and {truth.name} differ in {key}; an actual scene may differ "
+                "from the believed one in the patient, not in the set-up"
+            )
+
+
 def _ask(plan: Plan) -> bool:
+    """Whether the operator approves. No answer (Ctrl-C, end of input) is no approval."""
     typer.echo(plan_text(plan, reasons=True))
-    return typer.confirm("Carry out this plan?", default=False)
+    # At the prompt the first Ctrl-C has to end the waiting, not to be noted for the next tick.
+    while_operating = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        return typer.confirm("Carry out this plan?", default=False)
+    except typer.Abort:
+        typer.echo()
+        return False
+    finally:
+        signal.signal(signal.SIGINT, while_operating)

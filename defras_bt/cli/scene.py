@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 from defras_bt.cli.errors import UserError
-from defras_bt.cli.files import find_scene
+from defras_bt.cli.files import find_scene, folder_for
 from defras_sim.scene_file import write_scene, write_variant
 from defras_sim.scene_generator import NoScene, generate_scene
 from defras_sim.scene_picture import draw_scene
@@ -41,12 +41,12 @@ def new(
     Example: defras scene new --seed 7 --actual more -o scenes
     """
     console = Console(soft_wrap=True, highlight=False)
+    folder_for(out)
     with console.status("drawing scenes and rehearsing retractions"):
         try:
             generated = generate_scene(seed, actual.value)
         except NoScene as error:
             raise UserError(str(error)) from error
-    out.mkdir(parents=True, exist_ok=True)
     believed, truth = generated.believed.scene, generated.actual.scene
     believed_file, actual_file = out / f"{believed.name}.yaml", out / f"{truth.name}.yaml"
     write_scene(believed, believed_file)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from defras_bt.cli.errors import UserError
-from defras_bt.recording.viewer import ViewerMissing, screenshot
+from defras_bt.recording.viewer import ViewerMissing, screenshot, timeline_of
 from defras_bt.recording.viewer import view as open_viewer
 
 
@@ -22,13 +22,16 @@ def view(
 
     Example: defras view out/demo --picture timeline.png
     """
-    timeline = run / "run.rrd"
-    if not timeline.is_file():
-        raise UserError(f"{run} holds no run.rrd; give a folder that defras run --out wrote")
     try:
+        timeline = timeline_of(run)
         if picture is None:
-            open_viewer(run)
+            code = open_viewer(timeline)
         else:
+            if picture.is_dir() or not picture.parent.is_dir():
+                raise UserError(f"--picture {picture}: give a PNG file in a folder that exists")
             screenshot(timeline, picture)
-    except ViewerMissing as error:
+            code = 0
+    except (ViewerMissing, OSError) as error:
         raise UserError(str(error)) from error
+    if code != 0:
+        raise UserError(f"the viewer ended with code {code}; without a screen, give --picture FILE")

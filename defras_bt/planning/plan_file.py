@@ -47,7 +47,13 @@ def load_plan(file: Path, scene: Scene) -> PreoperativeResult:
         StalePlanFile: it was made for other content than ``scene`` has now.
     """
     try:
-        result = _PlanFile.model_validate_json(file.read_text(encoding="utf-8")).result
+        content = file.read_bytes()
+    except OSError as error:
+        raise InvalidPlanFile(
+            f"{file}: cannot be read: {error.strerror}; give a file that `defras plan -o` wrote"
+        ) from error
+    try:
+        result = _PlanFile.model_validate_json(content).result
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "the file"

@@ -37,7 +37,9 @@ def timeline_of(run: Path) -> Path:
     """
     file = run / TIMELINE if run.is_dir() else run
     if not file.is_file():
-        raise FileNotFoundError(f"{file} does not exist; give a run's folder or an .rrd file")
+        raise FileNotFoundError(
+            f"{file} does not exist; give a folder that defras run --out wrote, or its run.rrd"
+        )
     return file
 
 

@@ -10,7 +10,7 @@ from tests.recording.synthetic_run import SyntheticRun
 
 
 def test_a_run_is_a_folder_or_its_timeline(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match=r"run\.rrd does not exist; give a run's folder"):
+    with pytest.raises(FileNotFoundError, match=r"run\.rrd does not exist; give a folder"):
         timeline_of(tmp_path)
     (tmp_path / "run.rrd").touch()
     assert timeline_of(tmp_path) == timeline_of(tmp_path / "run.rrd") == tmp_path / "run.rrd"
