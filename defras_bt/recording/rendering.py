@@ -39,18 +39,6 @@ class View:
     height_px: int
 
 
-def looking_at(
-    position_m: Floats, target_m: Floats, fov_rad: float, width_px: int, height_px: int
-) -> View:
-    """A view with z up in the picture."""
-    forward = np.subtract(target_m, position_m)
-    forward = forward / np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(forward, right), forward], axis=1)
-    return View(Pose(np.asarray(position_m, float), rotation), fov_rad, width_px, height_px)
-
-
 def render(bodies: Sequence[Body], view: View) -> NDArray[np.uint8]:
     """Picture (height, width, 3) with diffuse light from the upper left and its shadows."""
     vertices_m = np.concatenate([body.vertices_m for body in bodies])

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from defras_bt.recording import palette
 from defras_bt.recording.record import RunInfo, TickRecord
-from defras_bt.recording.rendering import Body, View, looking_at, render
+from defras_bt.recording.rendering import Body, View, render
 from defras_bt.recording.shapes import disc, rectangle
-from defras_sim.camera.pinhole import tissue_from_camera
+from defras_sim.camera.pinhole import looking_at, tissue_from_camera
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
@@ -22,9 +22,8 @@ _SHAFT_M, _SHAFT_RADIUS_M = 0.11, 0.0027
 
 def field_view() -> View:
     """As an assistant sees it who stands at the endoscope's right."""
-    return looking_at(
-        np.array([-0.17, -0.21, 0.17]), np.array([0.0, 0.0, 0.018]), 0.58, _WIDTH_PX, _HEIGHT_PX
-    )
+    pose = looking_at(np.array([-0.17, -0.21, 0.17]), np.array([0.0, 0.0, 0.018]))
+    return View(pose, 0.58, _WIDTH_PX, _HEIGHT_PX)
 
 
 def endoscope_view(scene: Scene) -> View:

@@ -3,11 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from defras_bt.recording.rendering import Body, looking_at, render
+from defras_bt.recording.rendering import Body, View, render
 from defras_bt.recording.shapes import circle, disc, rectangle, vertex_normals
+from defras_sim.camera.pinhole import looking_at
 from tests.recording.synthetic_run import flap_surface
 
-DOWN = looking_at(np.array([0.0, -1e-6, 0.5]), np.zeros(3), 0.5, 60, 40)
+DOWN = View(looking_at(np.array([0.0, -1e-6, 0.5]), np.zeros(3)), 0.5, 60, 40)
 
 
 def test_the_nearer_body_hides_the_farther() -> None:

@@ -17,17 +17,25 @@ def tissue_from_camera(camera: Camera) -> Pose:
     Raises:
         ValueError: the camera looks straight up or down, or at its own position.
     """
-    position = np.array(camera.position_m)
-    forward = np.array(camera.target_m) - position
+    return looking_at(np.array(camera.position_m), np.array(camera.target_m))
+
+
+def looking_at(position_m: Floats, target_m: Floats) -> Pose:
+    """tissue_from_camera of a camera at ``position_m`` (3,) with ``target_m`` (3,) in the middle.
+
+    Raises:
+        ValueError: the camera looks straight up or down, or at its own position.
+    """
+    forward = target_m - position_m
     right = np.cross(forward, [0.0, 0.0, 1.0])
     if np.linalg.norm(right) < 1e-9:
         raise ValueError(
-            f"a camera at {camera.position_m} that looks at {camera.target_m} has no upright "
+            f"a camera at {position_m} that looks at {target_m} has no upright "
             "picture; move its position or target off the common vertical line"
         )
     forward /= np.linalg.norm(forward)
     right /= np.linalg.norm(right)
-    return Pose(position, np.stack([right, np.cross(forward, right), forward], axis=1))
+    return Pose(position_m, np.stack([right, np.cross(forward, right), forward], axis=1))
 
 
 def intrinsics(camera: Camera) -> Floats:
