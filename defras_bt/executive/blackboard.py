@@ -87,7 +87,6 @@ class Blackboard:
     blocked: set[GridPoint] = field(default_factory=set)
     at: dict[str, GridPoint] = field(default_factory=dict)
     grips: dict[str, Grip] = field(default_factory=dict)
-    actions_done: int = 0
 
     rest_calibrated: bool = False
     force_over_s: float = 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -72,13 +72,6 @@ def find_exposing(scene: Scene, most_points: int = 10) -> Rehearsal | None:
             if confirmed.best_visibility >= wanted and confirmed.force_max_n <= force_n:
                 return confirmed
     return None
-
-
-def exposure_map(scene: Scene) -> Mapping[GraspPoint, Rehearsal]:
-    """The best rehearsal of every grasp point, on the coarse mesh."""
-    points = promising_points(scene)
-    coarse = on_mesh(scene, SCREENING_ELEMENTS_XYZ)
-    return dict(zip(points, best_rehearsals(coarse, points), strict=True))
 
 
 def on_mesh(scene: Scene, elements_xyz: tuple[int, int, int]) -> Scene:

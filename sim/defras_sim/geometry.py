@@ -42,7 +42,3 @@ class Pose:
     @property
     def quaternion_xyzw(self) -> Floats:
         return Rotation.from_matrix(self.rotation).as_quat()
-
-    @staticmethod
-    def from_quaternion(position_m: Floats, quaternion_xyzw: Floats) -> Pose:
-        return Pose(np.asarray(position_m, float), Rotation.from_quat(quaternion_xyzw).as_matrix())

@@ -72,7 +72,7 @@ class ManoeuvreChecks:
         assert bench.run(node) == Status.SUCCESS
         assert node.code == "done"
         assert bench.board.grips["psm1"].done == ("something", self.leaf.spoken)
-        assert bench.board.actions_done == 1
+        assert len(bench.told("action")) == 1
         assert bench.board.events[-1].data == {"action": self.leaf.spoken, "arm": "psm1"}
 
     def test_interrupted_it_goes_on_to_its_old_end(self, bench, start_m, node):

@@ -27,7 +27,7 @@ def test_it_closes_until_the_jaw_holds(bench, grasp):
     assert (grip.point, grip.done, grip.starts_m) == ((2, 4), (), {})
     np.testing.assert_array_equal(grip.grasp_tip.position_m, tip_m)
     assert bench.twin.holding == {"psm1"}
-    assert bench.board.actions_done == 1
+    assert len(bench.told("action")) == 1
     assert bench.board.blocked == set()
 
 
@@ -36,7 +36,7 @@ def test_a_jaw_that_closes_on_nothing_blocks_the_point(bench, grasp):
     assert bench.run(grasp) == Status.FAILURE
     assert grasp.code == "nothing_grasped"
     assert bench.board.blocked == {(2, 4)}
-    assert bench.board.actions_done == 0
+    assert bench.told("action") == []
 
 
 def test_a_jaw_that_neither_closes_nor_holds_times_out_and_blocks_the_point(bench, grasp):

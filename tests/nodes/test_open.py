@@ -15,7 +15,7 @@ def test_it_opens_the_jaw_and_leaves_the_tip_where_it_is(bench):
     assert bench.run(node) == Status.SUCCESS
     assert node.code == "done"
     assert (bench.tip_m() == tip_m).all()
-    assert bench.board.actions_done == 1
+    assert len(bench.told("action")) == 1
 
 
 def test_it_does_not_drop_tissue(bench):
@@ -34,4 +34,4 @@ def test_a_stuck_jaw_is_reported_after_a_time_of_the_world(bench):
     assert node.code == "time_out"
     assert "stands at 0.00 rad" in node.feedback_message
     assert JAW_TIME_OUT_S < bench.world.time_s - started_s < JAW_TIME_OUT_S + 0.2
-    assert bench.board.actions_done == 0
+    assert bench.told("action") == []

@@ -34,7 +34,7 @@ def test_it_ends_on_the_grasp_point_and_says_so(bench, reach, goal_m):
     assert reach.code == "done"
     np.testing.assert_allclose(bench.tip_m(), goal_m, atol=ARRIVED_M)
     assert bench.board.at == {"psm1": (2, 4)}
-    assert bench.board.actions_done == 1
+    assert len(bench.told("action")) == 1
     assert bench.told("action") == ["PSM1 has reached grasp point (2, 4)."]
     assert bench.board.events[-1].data == {"action": "reach", "arm": "psm1"}
 
@@ -89,7 +89,7 @@ def test_an_arm_that_holds_tissue_does_not_reach_elsewhere(bench):
     assert bench.tick(reach) == Status.FAILURE
     assert reach.code == "holding"
     assert bench.board.command.arms == {}
-    assert bench.board.actions_done == 0
+    assert bench.told("action") == []
 
 
 def test_half_the_rate_takes_twice_as_long_and_still_arrives(bench, reach, goal_m):
