@@ -81,6 +81,8 @@ def show(
     file, found = find_scene(scene)
     truth = find_scene(actual)[1] if actual is not None else None
     picture = out or Path(f"{file.stem}.png")
+    if picture.is_dir() or not picture.suffix:
+        raise UserError(f"--out {picture}: give the name of a file, as in {file.stem}.png")
     try:
         draw_scene(found, picture, truth)
     except (OSError, ValueError) as error:

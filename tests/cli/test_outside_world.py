@@ -54,6 +54,7 @@ def nothing_is_rehearsed(monkeypatch: pytest.MonkeyPatch) -> None:
         ("run", "demo", "--out", "FILE/inside"),
         ("plan", "demo", "--out", "FILE/plan.json"),
         ("plan", "demo", "--out", "FOLDER"),
+        ("scene", "show", "demo", "--out", "FOLDER"),
         ("scene", "new", "--seed", "1", "--out", "FILE"),
     ],
 )
