@@ -43,6 +43,10 @@ class Execution:
     finished: bool
 
 
+class NothingToRetract(ValueError):
+    """The scene's region needs no retraction, so there is none to plan."""
+
+
 @dataclass(frozen=True)
 class PreoperativeResult:
     """What the rehearsals say. ``chosen`` is None where none qualified; ``reason`` says why."""
@@ -66,8 +70,14 @@ def preoperative_plan(
 
     Raises:
         NoPlan: no arm can reach any grasp point.
+        NothingToRetract: the region is visible as things are.
     """
     executions = rehearse_all(scene, jobs=jobs, progress=progress, step_m=step_m)
+    if executions and not any(execution.manoeuvres for execution in executions):
+        raise NothingToRetract(
+            f"scene {scene.name!r}: {executions[0].visibility:.0%} of the region is visible before "
+            "anything is moved; put the region deeper under the tissue"
+        )
     median_n = median_force_n(executions)
     limit_n = scene.thresholds.force_n or THRESHOLD_OVER_MEDIAN * median_n
     chosen = choose(executions, scene.thresholds.roi_visibility, limit_n)

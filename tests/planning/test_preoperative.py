@@ -8,6 +8,7 @@ import pytest
 from defras_bt.planning.plan_file import InvalidPlanFile, StalePlanFile, load_plan, save_plan
 from defras_bt.planning.preoperative import (
     Execution,
+    NothingToRetract,
     choose,
     force_threshold_over,
     median_force_n,
@@ -51,6 +52,15 @@ def test_median_of_the_largest_forces():
     assert median_force_n([SHORT, GENTLE, ROUGH]) == 0.25
     with pytest.raises(ValueError, match="no retraction was rehearsed"):
         median_force_n([])
+
+
+def test_a_region_that_is_visible_already_is_said_so():
+    scene = make_scene(1, 1, 0.03, tissue={"elements_xyz": (4, 4, 1), "thickness_m": 0.001})
+    roi = scene.roi.model_copy(update={"center_x_m": -0.057, "radius_m": 0.003})
+    limits = scene.thresholds.model_copy(update={"roi_visibility": 0.05})
+    seen = scene.model_copy(update={"roi": roi, "thresholds": limits})
+    with pytest.raises(NothingToRetract, match=r"\d+% of the region is visible before"):
+        preoperative_plan(seen, jobs=1)
 
 
 @pytest.fixture(scope="module")
