@@ -26,7 +26,8 @@ class TickInputs:
 
     ``missing`` lists, in words, each reading that is absent, not a number or too old: nodes and
     gate treat any entry as a tripped guard. ``force_n`` is the largest grasp force estimated by
-    the twin: 0 while nothing is held, NaN while the twin cannot say.
+    the twin: 0 while nothing is held, NaN while the twin cannot say; ``force_over_s`` is how long
+    it has been over its threshold or unknown without a break.
     """
 
     tick: int
@@ -38,6 +39,7 @@ class TickInputs:
     force_threshold_n: float
     reading: MonitorReading | None
     operator_stop: str | None = None
+    force_over_s: float = 0.0
 
 
 @dataclass

@@ -16,6 +16,9 @@ BELOW_SURFACE_M = 0.003
 BESIDE_TISSUE_M = 0.10
 ABOVE_TISSUE_M = 0.12
 TURNING_RAD_S = 1.0
+# Behind the tree's own force guard: slow at once, stopped a little later than the tree should.
+RATE_OVER_FORCE = 0.5
+FORCE_PATIENCE_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ class CommandGate:
         if tissue:
             jaws = {name: ArmCommand(jaw_rad=arm.jaw_rad) for name, arm in proposed.arms.items()}
             return GateVerdict(Command(jaws), tuple(tissue))
+        if inputs.force_n > inputs.force_threshold_n:
+            rate = min(rate, RATE_OVER_FORCE)
         observed = inputs.observation.arms
         # A jaw that does not tell may hold tissue.
         holding = any(arm.grasped is not False for arm in observed.values())
@@ -65,6 +70,11 @@ class CommandGate:
         reasons = []
         if np.isnan(inputs.force_n):
             reasons.append("the force estimate is missing")
+        elif inputs.force_over_s >= FORCE_PATIENCE_S:
+            reasons.append(
+                f"the force is {inputs.force_n:.2f} N, over its threshold of "
+                f"{inputs.force_threshold_n:.2f} N for {inputs.force_over_s:.2f} s"
+            )
         if self._metric is not None:
             reading = inputs.reading
             if reading is None or np.isnan(reading.mu_m[self._metric]):

@@ -153,7 +153,7 @@ def _info(operation: Operation, executive: Executive, believed: Scene) -> RunInf
         world=operation.world,
         tree=executive.tree.name,
         seed=operation.seed,
-        metric=executive.tree.metric or "local",
+        metric=executive.tree.metric,
         force_threshold_n=operation.force_threshold_n,
         tree_paths=executive.tree.kinds(),
         versions=versions(),

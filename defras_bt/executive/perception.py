@@ -77,6 +77,7 @@ class Perception:
             force_threshold_n=self._force_threshold_n,
             reading=reading,
             operator_stop=self._operator_stop(),
+            force_over_s=board.force_over_s,
         )
 
     def _monitored(self, sensed: SensedObservation, state: TissueState) -> MonitorReading | None:

@@ -97,10 +97,10 @@ def _action(record: TickRecord) -> str:
 
 
 def _monitoring(record: TickRecord, info: RunInfo) -> tuple[Text, ...]:
-    if record.reading is None or info.metric not in record.reading.mu_m:
+    state = info.warning_state(record.reading)
+    if record.reading is None or info.metric is None or state is None:
         return ()
     mu_m = record.reading.mu_m[info.metric]
-    state = record.reading.warning_state.get(info.metric, 0)
     said = f"mu {1000 * mu_m:.1f} mm" if math.isfinite(mu_m) else "mu ?"
     return Text(said), Text(f"s={state}", style=_STATE_STYLES[state])
 

@@ -79,7 +79,7 @@ class RunInfo:
     """What is known of a run before its first tick.
 
     ``tree_paths`` lists (path, kind) of every node at the start. ``actual`` is None where nobody
-    knows it. ``versions``: package to version.
+    knows it. ``metric`` is None for a tree without monitoring. ``versions``: package to version.
     """
 
     scene: Scene
@@ -89,11 +89,17 @@ class RunInfo:
     world: str
     tree: str
     seed: int
-    metric: str
+    metric: str | None
     force_threshold_n: float
     tree_paths: tuple[tuple[str, str], ...]
     versions: Mapping[str, str]
     believed: NDArray[np.bool_]
+
+    def warning_state(self, reading: MonitorReading | None) -> int | None:
+        """The state that the run's tree listens to; None if it has none, or nothing was read."""
+        if reading is None or self.metric is None:
+            return None
+        return reading.warning_state.get(self.metric)
 
 
 @dataclass(frozen=True)

@@ -56,11 +56,11 @@ class RunLog:
                 self.node_ticks.setdefault(path, Counter())[status] += 1
         self._add_numbers(record)
         _extend(self._spans, record.time_s, record.action.name if record.action else "")
-        state = None if record.reading is None else record.reading.warning_state.get(self.metric)
+        state = self.info.warning_state(record.reading)
         _extend(self._states, record.time_s, "" if state is None else str(state))
 
     @property
-    def metric(self) -> str:
+    def metric(self) -> str | None:
         return self.info.metric
 
     @property

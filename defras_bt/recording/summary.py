@@ -98,9 +98,9 @@ class SummaryRecorder:
                 self._adopted += event.data["adopted"]
 
     def _count_warnings(self, record: TickRecord) -> None:
-        if record.reading is None:
+        state = self._started().warning_state(record.reading)
+        if state is None:
             return
-        state = record.reading.warning_state.get(self._started().metric, 0)
         if state > self._state:
             self._warnings[state] += 1
         self._state = state

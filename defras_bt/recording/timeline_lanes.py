@@ -30,7 +30,7 @@ class Lanes:
 
     def __init__(self, stream: rr.RecordingStream, info: RunInfo) -> None:
         self._stream = stream
-        self._metric = info.metric
+        self._info = info
         self._changes = Changes()
         self._kinds = dict(info.tree_paths)
         self._status: dict[str, str] = {}
@@ -41,7 +41,7 @@ class Lanes:
         self._log_tree({})
 
     def tick(self, record: TickRecord) -> None:
-        state = None if record.reading is None else record.reading.warning_state.get(self._metric)
+        state = self._info.warning_state(record.reading)
         if self._changes.new("warning_state", state):
             said = "" if state is None else str(state)
             self._stream.log("monitor/warning_state", rr.StateChange(state=said))

@@ -14,6 +14,7 @@ from defras_bt.executive.gate import (
     ABOVE_TISSUE_M,
     BELOW_SURFACE_M,
     BESIDE_TISSUE_M,
+    FORCE_PATIENCE_S,
     CommandGate,
 )
 from defras_bt.monitoring.reading import MonitorReading
@@ -253,3 +254,21 @@ def test_whatever_is_proposed(proposed, rate, tips, held, says):
         end = start + sent.linear_m_s * SCENE.tick_s
         assert (end >= np.minimum(start, low) - 1e-12).all()
         assert (end <= np.maximum(start, high) + 1e-12).all()
+
+
+class TestForce:
+    """The gate slows and stops on force by itself, whatever the tree does."""
+
+    def test_over_the_threshold_motion_is_halved(self):
+        sent = GATE.check(go(), 1.0, inputs(force_n=0.31)).command
+        assert speed_m_s(sent) == pytest.approx(0.005)
+
+    def test_a_rate_that_is_halved_already_is_not_halved_again(self):
+        sent = GATE.check(go(), 0.5, inputs(force_n=0.31)).command
+        assert speed_m_s(sent) == pytest.approx(0.005)
+
+    def test_too_long_over_the_threshold_nothing_moves_but_a_jaw_may_let_go(self):
+        verdict = GATE.check(go(), 0.5, inputs(force_n=0.31, force_over_s=FORCE_PATIENCE_S))
+        assert speed_m_s(verdict.command) == 0.0
+        assert verdict.command.arms["psm1"].jaw_rad == 0.8
+        assert "0.31 N" in verdict.reasons[0]
