@@ -31,6 +31,7 @@ class Finding:
 
 
 IMPORT_NAMES = {
+    "pillow": "PIL",
     "py-trees": "py_trees",
     "rerun-sdk": "rerun",
     "ruamel-yaml": "ruamel.yaml",
