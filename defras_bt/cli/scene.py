@@ -36,7 +36,8 @@ def new(
     """Make a scene and its actual one from a seed.
 
     Writes seedN.yaml (believed) and seedN_fewer.yaml (actual; or _more, _equal). Only scenes are
-    kept in which somebody who knows the attachments can expose the region.
+    kept in which somebody who knows the attachments can expose the region; finding one takes up to
+    several minutes.
 
     Example: defras scene new --seed 7 --actual more -o scenes
     """
