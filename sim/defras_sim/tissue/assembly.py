@@ -31,8 +31,9 @@ class PrincipalStress:
 class ElasticBody:
     """A mesh of one hyperelastic material. Positions are (nodes, 3); nothing is kept between calls.
 
-    ``mu_pa`` and ``lam_pa`` (elements,) are the material's own parameters, see
-    :func:`defras_sim.tissue.materials.lame_parameters`.
+    ``mu_pa`` and ``lam_pa`` (elements, points) are the material's own parameters, see
+    :func:`defras_sim.tissue.materials.lame_parameters`; given as one number, or one an element
+    (elements, 1), they are spread over the quadrature points.
     """
 
     def __init__(
@@ -44,11 +45,11 @@ class ElasticBody:
         rule: Quadrature | None = None,
     ) -> None:
         self.mesh = mesh
-        count = len(mesh.connectivity)
-        self.mu_pa = np.broadcast_to(np.asarray(mu_pa, dtype=float), count).copy()
-        self.lam_pa = np.broadcast_to(np.asarray(lam_pa, dtype=float), count).copy()
         self._code = materials.CODES[material]
         rule = rule or quadrature(mesh.element, mesh.cells_xyz)
+        shape = len(mesh.connectivity), len(rule.weights)
+        self.mu_pa = np.broadcast_to(np.asarray(mu_pa, dtype=float), shape).copy()
+        self.lam_pa = np.broadcast_to(np.asarray(lam_pa, dtype=float), shape).copy()
         self._values = shape_values(mesh.element, rule.points)
         self._gradients, self._volumes = _rest_gradients(mesh, rule)
         self.pattern, self._places = _pattern(mesh.connectivity, len(mesh.nodes_m))

@@ -1,7 +1,8 @@
 """Loops over elements and quadrature points, compiled.
 
 ``gradients`` (elements, points, 3, nodes of an element) are rest gradients of shape functions,
-``volumes`` (elements, points) rest volumes, ``mu`` and ``lam`` (elements,) the material's own.
+``volumes`` (elements, points) rest volumes, ``mu`` and ``lam`` (elements, points) the material's
+own.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def energy_and_gradient(
             slopes = gradients[e, q]
             volume = volumes[e, q]
             _deformation(slopes, local, F)
-            energy += volume * materials.stress(code, F, mu[e], lam[e], P)
+            energy += volume * materials.stress(code, F, mu[e, q], lam[e, q], P)
             for i in range(3):
                 x, y, z = volume * P[i, 0], volume * P[i, 1], volume * P[i, 2]
                 for a in range(width):
@@ -93,7 +94,7 @@ def tangent(
         for q in range(points):
             slopes = gradients[e, q]
             _deformation(slopes, local, F)
-            materials.tangent(code, F, mu[e], lam[e], A)
+            materials.tangent(code, F, mu[e, q], lam[e, q], A)
             volume = volumes[e, q]
             for i in range(3):
                 for k in range(i, 3):
@@ -142,7 +143,7 @@ def largest_principal_stress(
         for q in range(points):
             _deformation(gradients[e, q], local, F)
             J = cofactor(F, sigma)
-            materials.stress(code, F, mu[e], lam[e], P)
+            materials.stress(code, F, mu[e, q], lam[e, q], P)
             for i in range(3):
                 for j in range(3):
                     sigma[i, j] = (P[i, 0] * F[j, 0] + P[i, 1] * F[j, 1] + P[i, 2] * F[j, 2]) / J

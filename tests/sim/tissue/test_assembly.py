@@ -126,6 +126,29 @@ def distorted(elastic: ElasticBody, material: str) -> ElasticBody:
     return ElasticBody(moved_mesh, material, *lame_parameters(material, 3000.0, 0.45))
 
 
+@pytest.mark.parametrize("material", MATERIALS)
+def test_stiffness_may_differ_from_point_to_point(material):
+    """Energies of uniform bodies mix as the field says, and the gradient is still its slope."""
+    uniform = body("hexahedron20", material)
+    x = shaken(uniform.mesh)
+    shape = uniform.mu_pa.shape
+    share = np.random.default_rng(1).uniform(0.2, 3.0, shape)
+    mixed = ElasticBody(uniform.mesh, material, share * uniform.mu_pa, share * uniform.lam_pa)
+    step = 1e-7 * np.random.default_rng(2).normal(size=x.shape)
+    up, down = (mixed.energy_and_gradient(x + s) for s in (step, -step))
+    _, gradient = mixed.energy_and_gradient(x)
+    assert np.sum(gradient * step) * 2 == pytest.approx(up[0] - down[0], rel=1e-5)
+    slope = tangent(mixed, x) @ step.ravel() * 2
+    assert np.linalg.norm(slope - (up[1] - down[1]).ravel()) < 1e-6 * np.linalg.norm(slope)
+    alone = 0.0
+    for element, point in np.ndindex(shape):
+        only = np.full(shape, 1e-12)
+        only[element, point] = share[element, point]
+        part = ElasticBody(uniform.mesh, material, only * uniform.mu_pa, only * uniform.lam_pa)
+        alone += part.energy_and_gradient(x)[0]
+    assert mixed.energy_and_gradient(x)[0] == pytest.approx(alone, rel=1e-6)
+
+
 def test_only_the_rigid_motions_are_free():
     """The integration rule adds no spurious modes: six zero eigenvalues, then bending."""
     elastic = ElasticBody(
