@@ -24,21 +24,15 @@ from defras_sim.tissue.hole_response import HoleResponse
 from defras_sim.tissue.holes import Holes
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import Integers, slab_mesh
-from defras_sim.tissue.path import Trail, between, length_m, markers_m
+from defras_sim.tissue.path import length_m
 from defras_sim.tissue.readout import tissue_state
-from defras_sim.tissue.solver import NewtonSettings, NewtonSolver, Solution
+from defras_sim.tissue.solver import NewtonSettings, NewtonSolver
 from defras_sim.tissue.springs import ROWS, joined
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.surface import surface_map
+from defras_sim.tissue.travel import Tips, Traveller
 
 __all__ = ["NothingToGrasp", "TissueModel", "TissueSnapshot"]
-
-# Of the tip between two equilibria on the way to a far one.
-MAX_TIP_STEP_M = 0.004
-# Of Newton's method, beside those for each such step: a solve that fails should fail soon.
-SPARE_ITERATIONS = 80
-ITERATIONS_PER_STEP = 10
-MAX_ITERATIONS = 500
 
 
 @dataclass(frozen=True)
@@ -74,9 +68,9 @@ class TissueModel:
         self._holes = Holes(self.mesh, scene)
         self._positions_m = self.mesh.nodes_m.copy()
         self._grasps: dict[str, Grasp] = {}
-        self._trail = Trail()
         self._energy = self._assembled()
         self._solver = NewtonSolver(NewtonSettings(residual_share * self._energy.force_scale_n()))
+        self._traveller = Traveller(self._solver, self._energy_at)
 
     @property
     def hole_stiffness_n_per_m(self) -> Floats:
@@ -126,7 +120,6 @@ class TissueModel:
         del self._grasps[arm]
         if not self._grasps:
             self._positions_m = self.mesh.nodes_m.copy()
-        self._solver.forget()
         self._changed()
 
     def reset(self) -> None:
@@ -144,12 +137,11 @@ class TissueModel:
             self._changed()
         self._place(snapshot)
 
-    def solve(self, tips: Mapping[str, Pose]) -> TissueState:
-        """Equilibrium with each holding arm's tip at its pose in ``tips`` (tissue_from_tip).
+    def solve(self, tips: Tips) -> TissueState:
+        """Equilibrium with each holding arm's tip at its pose in ``tips``.
 
-        Long ways are gone in steps of some millimetres, halved where a step fails. Where other
-        holes hold than before, the way may have to start again from rest. If that does not help,
-        the state is the last good one, marked as not converged.
+        Where other holes hold than before, the way may have to start again from rest. If that does
+        not help, the state is the last good one, marked as not converged.
 
         Raises:
             ValueError: a holding arm has no pose, a pose is not finite, or an arm holds nothing.
@@ -183,7 +175,7 @@ class TissueModel:
 
     def _changed(self) -> None:
         """What holds the tissue is different from now on."""
-        self._trail.clear()
+        self._traveller.forget()
         self._energy = self._assembled()
 
     def _assembled(self) -> PotentialEnergy:
@@ -201,52 +193,24 @@ class TissueModel:
         self._positions_m = snapshot.positions_m.copy()
         self._grasps = dict(snapshot.grasps)
         self._energy.targets_m = self._targets_m()
-        self._solver.forget()
-        self._trail.clear()
+        self._traveller.forget()
 
-    def _travel(self, tips: Mapping[str, Pose]) -> tuple[bool, int]:
-        """Go to ``tips`` through equilibria; (arrived, iterations). Stops at the last good one."""
-        starts = self._tips()
-        way = length_m(starts, tips)
-        steps = max(1.0, np.ceil(way / MAX_TIP_STEP_M))
-        step = 1.0 / steps
-        smallest = step / 16 if way > 0 else step
-        most = min(MAX_ITERATIONS, SPARE_ITERATIONS + ITERATIONS_PER_STEP * steps)
-        share, iterations = 0.0, 0
-        while share < 1.0 and step >= smallest and iterations <= most:
-            aim = min(1.0, share + step)
-            solution = self._step_to(
-                {arm: between(start, tips[arm], aim) for arm, start in starts.items()}
-            )
-            iterations += solution.iterations
-            if solution.converged:
-                share, step = aim, 1.5 * step
-            else:
-                step *= 0.5
-        return share >= 1.0, iterations
+    def _travel(self, tips: Tips) -> tuple[bool, int]:
+        """Go towards ``tips`` as far as there are equilibria; (arrived, iterations)."""
+        arrival = self._traveller.go(self._positions_m, self._tips(), tips)
+        self._positions_m = arrival.positions_m
+        self._energy_at(arrival.tips)
+        return arrival.arrived, arrival.iterations
 
-    def _step_to(self, tips: Mapping[str, Pose]) -> Solution:
-        """Take the tissue to the equilibrium at ``tips``, or leave it as it was."""
-        before = self._grasps
+    def _energy_at(self, tips: Tips) -> PotentialEnergy:
+        """The energy with each holding arm's tip at its pose in ``tips``."""
         self._grasps = {
-            arm: replace(grasp, tissue_from_tip=tips[arm]) for arm, grasp in before.items()
+            arm: replace(grasp, tissue_from_tip=tips[arm]) for arm, grasp in self._grasps.items()
         }
         self._energy.targets_m = self._targets_m()
-        markers = markers_m(tips)
-        starts = [self._positions_m, *self._trail.guesses(markers)]
-        energies = [self._energy.energy_and_gradient(start)[0] for start in starts]
-        solution = self._solver.minimise(self._energy, starts[int(np.argmin(energies))])
-        if solution.converged:
-            self._positions_m = solution.positions_m
-            self._trail.add(markers, solution.positions_m)
-        else:
-            self._grasps = before
-            self._energy.targets_m = self._targets_m()
-            self._solver.forget()
-            self._trail.clear()
-        return solution
+        return self._energy
 
-    def _check(self, tips: Mapping[str, Pose]) -> None:
+    def _check(self, tips: Tips) -> None:
         if set(tips) != set(self._grasps):
             raise ValueError(
                 f"tips given for {sorted(tips)}; tissue is held by {sorted(self._grasps)}"
