@@ -21,7 +21,7 @@ Vector = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 
 MaterialName = Literal["corotational", "neo_hookean", "stable_neo_hookean"]
-ElementName = Literal["hexahedron20", "tetrahedron4"]
+ElementName = Literal["hexahedron20", "tetrahedron10", "tetrahedron4"]
 
 GraspPoint = tuple[int, int]
 """(column, row), both from 1 at the smallest x and y."""

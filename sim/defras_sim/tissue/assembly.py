@@ -13,7 +13,6 @@ from defras_sim.scene import MaterialName
 from defras_sim.tissue import kernels, materials
 from defras_sim.tissue.elements import (
     Quadrature,
-    quadrature,
     shape_gradients,
     shape_values,
 )
@@ -46,7 +45,7 @@ class ElasticBody:
     ) -> None:
         self.mesh = mesh
         self._code = materials.CODES[material]
-        rule = rule or quadrature(mesh.element, mesh.cells_xyz)
+        rule = rule or mesh.quadrature
         shape = len(mesh.connectivity), len(rule.weights)
         self.mu_pa = np.broadcast_to(np.asarray(mu_pa, dtype=float), shape).copy()
         self.lam_pa = np.broadcast_to(np.asarray(lam_pa, dtype=float), shape).copy()

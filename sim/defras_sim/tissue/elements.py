@@ -1,7 +1,8 @@
-"""Shape functions and quadrature of the two elements, on their reference domains.
+"""Shape functions and quadrature of the elements, on their reference domains.
 
 ``hexahedron20``: serendipity hexahedron on [-1, 1]^3, nodes in VTK order (8 corners, then the
-middles of the bottom, top and vertical edges). ``tetrahedron4``: linear, on the unit simplex.
+middles of the bottom, top and vertical edges). Tetrahedra: see
+:mod:`defras_sim.tissue.tetrahedra`.
 Source: Zienkiewicz and Taylor, The Finite Element Method, vol. 1, ch. 4 (shape functions);
 Irons, Int. J. Numer. Meth. Eng. 3 (1971), 293-294 (14-point rule).
 """
@@ -14,6 +15,7 @@ import numpy as np
 
 from defras_sim.geometry import Floats
 from defras_sim.scene import ElementName
+from defras_sim.tissue import tetrahedra
 
 # fmt: off
 HEXAHEDRON20_NODES: Floats = np.array(
@@ -38,7 +40,9 @@ class Quadrature:
 def shape_values(element: ElementName, points: Floats) -> Floats:
     """Shape functions (n, nodes of the element) at reference points (n, 3)."""
     if element == "tetrahedron4":
-        return np.column_stack([1 - points.sum(axis=1), points])
+        return tetrahedra.barycentric(points)
+    if element == "tetrahedron10":
+        return tetrahedra.quadratic_values(points)
     a = HEXAHEDRON20_NODES
     factors = 1 + points[:, None, :] * a  # (n, 20, 3)
     corners = factors[:, :8].prod(axis=2) / 8 * ((points[:, None, :] * a[:8]).sum(axis=2) - 2)
@@ -49,8 +53,9 @@ def shape_values(element: ElementName, points: Floats) -> Floats:
 def shape_gradients(element: ElementName, points: Floats) -> Floats:
     """Derivatives (n, nodes of the element, 3) of the shape functions by reference coordinates."""
     if element == "tetrahedron4":
-        rows = np.array([[-1, -1, -1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
-        return np.tile(rows, (len(points), 1, 1))
+        return tetrahedra.linear_gradients(points)
+    if element == "tetrahedron10":
+        return tetrahedra.quadratic_gradients(points)
     a = HEXAHEDRON20_NODES
     x = points[:, None, :]
     bubble = a[8:] == 0
@@ -96,4 +101,6 @@ def quadrature(element: ElementName, cells_xyz: tuple[int, int, int]) -> Quadrat
     """
     if element == "tetrahedron4":
         return Quadrature(np.full((1, 3), 0.25), np.array([1 / 6]))
+    if element == "tetrahedron10":
+        return Quadrature(*tetrahedra.four_points())
     return gauss_hexahedron(2) if sorted(cells_xyz)[1] >= 2 else irons_hexahedron()

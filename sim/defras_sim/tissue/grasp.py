@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from defras_sim.geometry import Floats, Pose
 from defras_sim.surface import Surface
-from defras_sim.tissue.mesh import Integers, Mesh
+from defras_sim.tissue.mesh import Integers, Mesh, SlabMesh
 from defras_sim.tissue.springs import ROW_SHIFTS, Springs, disc_rows
 
 # Stiff enough that a patch under 1 N gives 0.1 mm, soft enough not to spoil the conditioning.
@@ -65,7 +65,7 @@ def grasped_patch(
     The disc is moved inwards where it would reach over the slab's edge. Linear tetrahedra are held
     by whole nodes instead, as PyBullet holds them.
     """
-    if mesh.element == "tetrahedron4":
+    if isinstance(mesh, SlabMesh) and mesh.element == "tetrahedron4":
         nodes = nodes_under_jaw(mesh, center_xy_m, radius_m)
         rows = sparse.csr_array(sparse.eye_array(len(mesh.nodes_m), format="csr")[nodes])
         shifts = np.ones(len(nodes))
@@ -87,7 +87,7 @@ def grasped_patch(
     )
 
 
-def nodes_under_jaw(mesh: Mesh, center_xy_m: Floats, radius_m: float) -> Integers:
+def nodes_under_jaw(mesh: SlabMesh, center_xy_m: Floats, radius_m: float) -> Integers:
     """Nodes of both faces within the jaw's radius and half a cell of rest position (2,).
 
     Half a cell more than the radius always gives enough columns of nodes to hold an orientation.

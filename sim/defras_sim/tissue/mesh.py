@@ -5,6 +5,7 @@ The slab is a box in the tissue frame: upper face at z = 0, lower face at z = -t
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,13 @@ from scipy import sparse
 
 from defras_sim.geometry import Floats
 from defras_sim.scene import ElementName, Tissue
-from defras_sim.tissue.elements import HEXAHEDRON20_NODES, shape_values
+from defras_sim.tissue.elements import (
+    HEXAHEDRON20_NODES,
+    Quadrature,
+    quadrature,
+    shape_values,
+)
+from defras_sim.tissue.tetrahedra import with_edge_middles
 
 Integers = NDArray[np.int64]
 
@@ -23,23 +30,33 @@ _KUHN_ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)
 
 
 @dataclass(frozen=True)
-class Mesh:
+class Mesh(ABC):
     """Rest positions ``nodes_m`` (n, 3) and ``connectivity`` (elements, nodes of an element)."""
 
     element: ElementName
     nodes_m: Floats
     connectivity: Integers
-    origin_m: Floats
-    cell_m: Floats
-    cells_xyz: tuple[int, int, int]
+
+    @property
+    @abstractmethod
+    def quadrature(self) -> Quadrature:
+        """The rule that the tissue model integrates with."""
+
+    @abstractmethod
+    def locate(self, points_m: Floats) -> tuple[Integers, Floats]:
+        """Element (n,) and reference coordinates (n, 3) of rest points (n, 3).
+
+        Raises:
+            ValueError: a point lies outside the tissue.
+        """
 
     def interpolation(self, points_m: Floats) -> sparse.csr_array:
         """Matrix (points, nodes) that interpolates nodal values at rest points (points, 3).
 
         Raises:
-            ValueError: a point lies outside the slab.
+            ValueError: a point lies outside the tissue.
         """
-        elements, local = self._locate(np.asarray(points_m, dtype=float))
+        elements, local = self.locate(np.asarray(points_m, dtype=float))
         values = shape_values(self.element, local)
         columns = self.connectivity[elements]
         rows = np.repeat(np.arange(len(values)), values.shape[1])
@@ -48,8 +65,20 @@ class Mesh:
         entries = (values.ravel()[keep], (rows[keep], columns.ravel()[keep]))
         return sparse.csr_array(entries, shape=shape)
 
-    def _locate(self, points_m: Floats) -> tuple[Integers, Floats]:
-        """Element (n,) and reference coordinates (n, 3) of rest points (n, 3)."""
+
+@dataclass(frozen=True)
+class SlabMesh(Mesh):
+    """A box of ``cells_xyz`` cells of ``cell_m`` (3,), the first at ``origin_m`` (3,)."""
+
+    origin_m: Floats
+    cell_m: Floats
+    cells_xyz: tuple[int, int, int]
+
+    @property
+    def quadrature(self) -> Quadrature:
+        return quadrature(self.element, self.cells_xyz)
+
+    def locate(self, points_m: Floats) -> tuple[Integers, Floats]:
         scaled = (points_m - self.origin_m) / self.cell_m
         counts = np.array(self.cells_xyz)
         if np.any(scaled < -1e-9) or np.any(scaled > counts + 1e-9):
@@ -73,14 +102,17 @@ class Mesh:
         return number * 6 + kind, local
 
 
-def slab_mesh(tissue: Tissue, element: ElementName, elements_xyz: tuple[int, int, int]) -> Mesh:
+def slab_mesh(tissue: Tissue, element: ElementName, elements_xyz: tuple[int, int, int]) -> SlabMesh:
     """The slab of ``tissue`` cut into ``elements_xyz`` cells."""
     if element == "hexahedron20":
         nodes, connectivity = _hexahedral_slab(tissue, elements_xyz)
     else:
         nodes, connectivity = tetrahedral_slab(tissue, elements_xyz)
+    if element == "tetrahedron10":
+        nodes, connectivity = with_edge_middles(nodes, connectivity)
     size, origin = _box(tissue)
-    return Mesh(element, nodes, connectivity, origin, size / np.array(elements_xyz), elements_xyz)
+    cell = size / np.array(elements_xyz)
+    return SlabMesh(element, nodes, connectivity, origin, cell, elements_xyz)
 
 
 def tetrahedral_slab(tissue: Tissue, elements_xyz: tuple[int, int, int]) -> tuple[Floats, Integers]:

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from defras_sim.scene import Tissue
 from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.materials import lame_parameters
-from defras_sim.tissue.mesh import Mesh, slab_mesh
+from defras_sim.tissue.mesh import SlabMesh, slab_mesh
 
 MATERIALS = ["corotational", "neo_hookean", "stable_neo_hookean"]
 ELEMENTS = ["hexahedron20", "tetrahedron4"]
@@ -19,7 +19,7 @@ def body(element: str, material: str, cells=(3, 2, 2)) -> ElasticBody:
     )
 
 
-def shaken(mesh: Mesh) -> np.ndarray:
+def shaken(mesh: SlabMesh) -> np.ndarray:
     """A large smooth deformation of the mesh, plus a little noise."""
     x = mesh.nodes_m
     bent = Rotation.from_rotvec([0.3, 0.5, -0.8]).apply(x * [1.2, 0.9, 1.0])
@@ -120,7 +120,7 @@ def distorted(elastic: ElasticBody, material: str) -> ElasticBody:
         for element in mesh.connectivity:
             for number, (a, b) in enumerate(ends):
                 shift[element[8 + number]] = (shift[element[a]] + shift[element[b]]) / 2
-    moved_mesh = Mesh(
+    moved_mesh = SlabMesh(
         mesh.element, x + shift, mesh.connectivity, mesh.origin_m, mesh.cell_m, mesh.cells_xyz
     )
     return ElasticBody(moved_mesh, material, *lame_parameters(material, 3000.0, 0.45))
@@ -175,7 +175,7 @@ def test_principal_stress_of_uniaxial_tension():
 
 def test_an_inverted_mesh_is_refused():
     mesh = slab_mesh(Tissue(), "tetrahedron4", (1, 1, 1))
-    flipped = Mesh(
+    flipped = SlabMesh(
         mesh.element,
         mesh.nodes_m * [1, 1, -1],
         mesh.connectivity,

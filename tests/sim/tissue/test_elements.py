@@ -9,6 +9,7 @@ from defras_sim.tissue.elements import (
     shape_gradients,
     shape_values,
 )
+from defras_sim.tissue.tetrahedra import TETRAHEDRON10_NODES
 
 TETRAHEDRON_NODES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
 
@@ -19,13 +20,17 @@ def inner_points(count: int = 20) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("element", "nodes"),
-    [("hexahedron20", HEXAHEDRON20_NODES), ("tetrahedron4", TETRAHEDRON_NODES)],
+    [
+        ("hexahedron20", HEXAHEDRON20_NODES),
+        ("tetrahedron10", TETRAHEDRON10_NODES),
+        ("tetrahedron4", TETRAHEDRON_NODES),
+    ],
 )
 def test_each_shape_function_is_one_at_its_own_node_only(element, nodes):
     np.testing.assert_allclose(shape_values(element, nodes), np.eye(len(nodes)), atol=1e-14)
 
 
-@pytest.mark.parametrize("element", ["hexahedron20", "tetrahedron4"])
+@pytest.mark.parametrize("element", ["hexahedron20", "tetrahedron10", "tetrahedron4"])
 def test_shape_functions_sum_to_one_and_gradients_match_differences(element):
     points = inner_points()
     np.testing.assert_allclose(shape_values(element, points).sum(axis=1), 1.0)

@@ -4,7 +4,7 @@ import pytest
 from defras_sim.scene import Tissue
 from defras_sim.tissue.mesh import slab_mesh, tetrahedral_slab
 
-ELEMENTS = ["hexahedron20", "tetrahedron4"]
+ELEMENTS = ["hexahedron20", "tetrahedron10", "tetrahedron4"]
 
 
 def points_in(tissue: Tissue, count: int = 200) -> np.ndarray:

@@ -75,6 +75,12 @@ def test_linear_tetrahedra_misjudge_the_force_as_known():
     np.testing.assert_allclose(forces, [0.0416, 0.1028], rtol=0.01)
 
 
+def test_quadratic_tetrahedra_read_what_felupe_reads():
+    """0.0131 and 0.0565 N at 10 and 20 mm (felupe, 10-node tetrahedra, 12x12x1)."""
+    forces = lift_nodes(slab_body("tetrahedron10", (12, 12, 1)), [0.01, 0.02])
+    np.testing.assert_allclose(forces, [0.0131, 0.0565], rtol=0.005)
+
+
 def test_forces_are_those_of_felupe_on_the_same_mesh():
     body = slab_body("hexahedron20", (4, 4, 1), gauss_hexahedron(3))
     ours = lift_nodes(body, [0.01])[0]
