@@ -7,21 +7,58 @@ the x-z plane divides the two arms' sides. In simulation it is also the world fr
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from defras_sim.geometry import Floats
 from defras_sim.scene_faults import scene_faults
+from defras_sim.scene_parts import (
+    ARMS,
+    AdoptedEffect,
+    Arm,
+    ArmName,
+    Attachments,
+    Camera,
+    ElementName,
+    GraspGrid,
+    MaterialName,
+    ModelExtension,
+    Motion,
+    Part,
+    Roi,
+    Simulation,
+    Thresholds,
+    Tissue,
+    Vector,
+)
 from defras_sim.yaml_source import InvalidFile, read_extended
 
-Vector = tuple[float, float, float]
-Positive = Annotated[float, Field(gt=0)]
-
-MaterialName = Literal["corotational", "neo_hookean", "stable_neo_hookean"]
-ElementName = Literal["hexahedron20", "tetrahedron10", "tetrahedron4"]
+__all__ = [
+    "RIGID_HOLE_N_PER_M",
+    "AdoptedEffect",
+    "Arm",
+    "ArmName",
+    "Attachments",
+    "Camera",
+    "ElementName",
+    "GraspGrid",
+    "GraspPoint",
+    "MaterialName",
+    "ModelExtension",
+    "Motion",
+    "Part",
+    "Roi",
+    "Scene",
+    "Simulation",
+    "Thresholds",
+    "Tissue",
+    "Vector",
+    "hole_stiffness_n_per_m",
+    "load_scene",
+]
 
 GraspPoint = tuple[int, int]
 """(column, row), both from 1 at the smallest x and y."""
@@ -38,137 +75,17 @@ def hole_stiffness_n_per_m(attached: NDArray[np.bool_]) -> Floats:
     return np.where(attached, RIGID_HOLE_N_PER_M, 0.0)
 
 
-class Part(BaseModel):
-    """Base of every part of a scene: unknown keys and NaN are faults, nothing ever changes."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Tissue(Part):
-    """The slab, its material, and the finite-element mesh the twin uses for it.
-
-    ``bed``: whether a rigid, frictionless bed lies right under it.
-    """
-
-    length_x_m: Positive = 0.12
-    width_y_m: Positive = 0.12
-    thickness_m: Positive = 0.005
-    young_modulus_pa: Positive = 3000.0
-    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = 0.45
-    material: MaterialName = "neo_hookean"
-    element: ElementName = "hexahedron20"
-    elements_xyz: tuple[int, int, int] = (8, 8, 1)
-    bed: bool = True
-
-
-class Attachments(Part):
-    """Holes of the lower face and which of them hold the tissue.
-
-    ``map`` is drawn as seen from above: first row at largest y, first column at smallest x;
-    ``#`` holds, ``.`` is free.
-    """
-
-    hole_pitch_m: Positive = 0.01
-    hole_radius_m: Positive = 0.003
-    map: tuple[str, ...]
-
-
-class GraspGrid(Part):
-    """Grasp points on the upper face; (column, row) count from 1 at the smallest x and y."""
-
-    columns: Annotated[int, Field(ge=1, le=40)] = 5
-    rows: Annotated[int, Field(ge=1, le=40)] = 5
-    margin_m: Annotated[float, Field(ge=0)] = 0.01
-    patch_radius_m: Positive = 0.005
-
-
-class Roi(Part):
-    """The hidden region of interest: a disc on the bed, just under the tissue's lower face."""
-
-    center_x_m: float
-    center_y_m: float
-    radius_m: Positive = 0.015
-
-
-class Arm(Part):
-    """A patient-side manipulator: where its remote centre of motion stands, and its side."""
-
-    rcm_m: Vector
-    home_tip_m: Vector
-    side: Literal["+y", "-y"]
-
-
-class Camera(Part):
-    """A pinhole camera, z up in its picture. ``vertical_fov_rad`` is the full angle."""
-
-    position_m: Vector
-    target_m: Vector
-    vertical_fov_rad: Annotated[float, Field(gt=0, lt=3)] = 0.7
-    width_px: Annotated[int, Field(ge=8)] = 320
-    height_px: Annotated[int, Field(ge=8)] = 240
-    noise_sd_m: Annotated[float, Field(ge=0)] = 0.0
-    period_s: Positive = 0.1
-
-
-class Motion(Part):
-    """Speeds and lengths of the six actions."""
-
-    reach_speed_m_s: Positive = 0.05
-    tissue_speed_m_s: Positive = 0.015
-    clearance_m: Positive = 0.03
-    pull_height_m: Positive = 0.04
-    move_limit_m: Positive = 0.03
-    fold_distance_m: Positive = 0.05
-
-
-class Thresholds(Part):
-    """Limits of monitoring, force and goal."""
-
-    delta_m: tuple[Positive, Positive, Positive] = (0.002, 0.004, 0.006)
-    force_n: Positive | None = None
-    roi_visibility: Annotated[float, Field(gt=0, le=1)] = 0.8
-    max_age_s: Positive = 0.5
-
-
-class AdoptedEffect(BaseModel):
-    """An effect the twin runs with; further keys are its parameters."""
-
-    model_config = ConfigDict(extra="allow", frozen=True)
-    effect: str
-
-
-class ModelExtension(Part):
-    effects: tuple[AdoptedEffect, ...] = ()
-
-
-class Simulation(Part):
-    """How a simulated world imitates the scene when the scene is the actual one."""
-
-    elements_xyz: tuple[int, int, int] = (10, 10, 1)
-    bullet_elements_xyz: tuple[int, int, int] = (12, 12, 1)
-    bullet_step_s: Positive = 0.001
-    bullet_damping: Positive = 0.004
-
-
-ArmName = Literal["psm1", "psm2"]
-
-_ARMS: dict[ArmName, Arm] = {
-    "psm1": Arm(rcm_m=(0.0, 0.09, 0.20), home_tip_m=(-0.02, 0.07, 0.06), side="+y"),
-    "psm2": Arm(rcm_m=(0.0, -0.09, 0.20), home_tip_m=(-0.02, -0.07, 0.06), side="-y"),
-}
-
-
 class Scene(Part):
     """One patient and set-up. Read with :func:`load_scene`."""
 
     name: str
     description: str = ""
-    tick_s: Positive = 0.05
+    tick_s: Annotated[float, Field(ge=0.005, le=0.5)] = 0.05
     tissue: Tissue = Tissue()
     attachments: Attachments
     grasp: GraspGrid = GraspGrid()
     roi: Roi
-    arms: dict[ArmName, Arm] = Field(default_factory=lambda: dict(_ARMS))
+    arms: dict[ArmName, Arm] = Field(default_factory=lambda: dict(ARMS))
     endoscope: Camera = Camera(position_m=(-0.17, 0.0, 0.12), target_m=(0.0, 0.0, 0.0))
     depth_camera: Camera = Camera(
         position_m=(0.17, 0.0, 0.20), target_m=(0.0, 0.0, 0.0), noise_sd_m=0.0005

@@ -18,6 +18,7 @@ SceneFault = tuple[Location, str]
 _ROUNDING_M = 1e-12
 _MOST_ELEMENTS = 64
 """Along one side. A mesh this fine already needs minutes for one step."""
+_MOST_HOLES = 2500
 
 
 def scene_faults(scene: Scene) -> Iterator[SceneFault]:
@@ -31,6 +32,14 @@ def scene_faults(scene: Scene) -> Iterator[SceneFault]:
             f"{min(tissue.length_x_m, tissue.width_y_m)}",
         )
         return  # the map cannot be judged
+    if nx * ny > _MOST_HOLES:
+        least_m = np.sqrt(scene.tissue.length_x_m * scene.tissue.width_y_m / _MOST_HOLES)
+        yield (
+            ("attachments", "hole_pitch_m"),
+            f"attachments.hole_pitch_m: {scene.attachments.hole_pitch_m} makes {nx} x {ny} holes; "
+            f"at least {least_m:.4f} keeps them below {_MOST_HOLES}",
+        )
+        return
     yield from _attachment_faults(scene)
     yield from _place_faults(scene)
     yield from _mesh_faults(scene)
