@@ -45,7 +45,16 @@ def timeline_of(run: Path) -> Path:
 
 def view(run: Path) -> int:
     """Open a run's timeline in the viewer; returns the viewer's exit code when it is closed."""
-    return subprocess.run([*_rerun(), str(timeline_of(run))], check=False).returncode
+    return subprocess.run(viewer_command(timeline_of(run)), check=False).returncode
+
+
+def viewer_command(timeline: Path, *options: str) -> list[str]:
+    """How the viewer is started on a file.
+
+    It always opens a server, by default to the whole network; a run may show a patient, so only
+    programs of this machine can reach it.
+    """
+    return [sys.executable, "-m", "rerun", str(timeline), "--bind", "127.0.0.1", *options]
 
 
 def screenshot(
@@ -58,8 +67,8 @@ def screenshot(
     """
     timeline = timeline_of(run)
     port = _free_port()
-    command = [*_rerun(), str(timeline), "--headless", "--port", str(port)]
-    command += ["--window-size", f"{size_px[0]}x{size_px[1]}"]
+    window = ("--window-size", f"{size_px[0]}x{size_px[1]}")
+    command = viewer_command(timeline, "--headless", "--port", str(port), *window)
     with TemporaryFile() as said:
         # CI keeps the viewer from asking about analytics.
         viewer = subprocess.Popen(
@@ -126,7 +135,3 @@ def _free_port() -> int:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
         return port
-
-
-def _rerun() -> list[str]:
-    return [sys.executable, "-m", "rerun"]

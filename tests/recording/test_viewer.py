@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+import os
+import socket
+import subprocess
+import time
 from pathlib import Path
 
 import pytest
 
 from defras_bt.recording.timeline import TimelineRecorder
-from defras_bt.recording.viewer import ViewerMissing, screenshot, timeline_of
+from defras_bt.recording.viewer import ViewerMissing, screenshot, timeline_of, viewer_command
 from tests.recording.synthetic_run import SyntheticRun
 
 
@@ -28,3 +32,39 @@ def test_missing_vulkan_says_what_to_install(
     with pytest.raises(ViewerMissing, match="apt-get install mesa-vulkan-drivers libvulkan1"):
         screenshot(tmp_path, tmp_path / "shot.png")
     assert not (tmp_path / "shot.png").exists()
+
+
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="reads the system's table of ports")
+def test_only_this_machine_can_reach_the_viewer(tmp_path: Path, short_run: SyntheticRun) -> None:
+    TimelineRecorder(tmp_path / "run.rrd").start(short_run.info)
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = viewer_command(tmp_path / "run.rrd", "--headless", "--port", str(port))
+    quiet = subprocess.DEVNULL
+    viewer = subprocess.Popen(command, env={**os.environ, "CI": "1"}, stdout=quiet, stderr=quiet)
+    try:
+        for _ in range(400):
+            if addresses := _listening(port):
+                break
+            time.sleep(0.05)
+        assert addresses == {"127.0.0.1"}
+    finally:
+        viewer.terminate()
+        viewer.wait()
+
+
+def _listening(port: int) -> set[str]:
+    """Addresses on which anything listens at ``port``, as the kernel tells."""
+    found = set()
+    for table, family in (("tcp", socket.AF_INET), ("tcp6", socket.AF_INET6)):
+        for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+            _, local, _, state, *_ = line.split()
+            address, _, at = local.partition(":")
+            if state == "0A" and int(at, 16) == port:
+                # Words of four bytes, each in the byte order of the machine.
+                packed = b"".join(
+                    bytes.fromhex(address[i : i + 8])[::-1] for i in range(0, len(address), 8)
+                )
+                found.add(socket.inet_ntop(family, packed))
+    return found
