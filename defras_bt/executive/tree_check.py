@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 
+from defras_bt.executive.tree_kinds import ParallelOptions
 from defras_bt.executive.tree_spec import NodeSpec
 from defras_sim.yaml_source import Fault
 
@@ -32,17 +33,18 @@ def moves(spec: NodeSpec) -> bool:
 def guards(spec: NodeSpec) -> bool:
     """Whether ``spec`` succeeds only in a tick in which a guard leaf under it succeeded.
 
-    Not so for ``sequence`` (does not look at a finished guard again), a parallel that needs one
-    success, and decorators: an inverted guard would let motion pass on missing data.
+    Not so for ``sequence`` and a synchronised parallel (they do not look at a finished guard
+    again), a parallel that does not need the guard's success, and decorators: an inverted guard
+    would let motion pass on missing data.
     """
     if spec.node_class is not None:
         return spec.node_class.role == "guard"
     if spec.kind == "reactive":
         return any(map(guards, spec.children))
-    if spec.kind == "parallel":
-        return getattr(spec.options, "succeed_when", None) == "all" and any(
-            map(guards, spec.children)
-        )
+    if isinstance(spec.options, ParallelOptions):
+        wanted = spec.options.succeed_when
+        needed = [child for child in spec.children if wanted == "all" or child.name in wanted]
+        return wanted != "one" and not spec.options.synchronise and any(map(guards, needed))
     if spec.kind in ("selector", "reactive_selector"):
         return all(map(guards, spec.children))
     return False

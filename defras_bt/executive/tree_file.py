@@ -155,11 +155,15 @@ class _Reader(FieldChecker):
         self, at: Location, kind: Kind, body: Mapping[Any, Any], depth: int, called: str | None
     ) -> NodeSpec | None:
         name = called or self.name(at, kind.name, body, kind.name)
+        before = len(self.faults)
         own_keys = ("name",) if kind.holds is None else ("name", kind.holds)
         options = self.checked(at, body, kind.options, kind.name, own_keys)
         children = self.children(at, kind, body, depth)
         if name is None or options is None or children is None:
             return None
+        objection = kind.objection(options, [child.name for child in children])
+        if objection is not None and len(self.faults) == before:
+            self.fault(at, objection)
         return NodeSpec(kind.name, name, self.place(at), options, children)
 
     def children(

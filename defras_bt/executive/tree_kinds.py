@@ -8,45 +8,41 @@ not looked at again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from py_trees import composites, decorators
+from py_trees import composites
 from py_trees.behaviour import Behaviour
 from py_trees.common import ParallelPolicy
 from pydantic import Field
 
 from defras_bt.executive.composites import PlanSlot
 from defras_bt.executive.node import NodeParameters, NoParameters
+from defras_bt.executive.registry import did_you_mean
+from defras_bt.executive.tree_decorators import DECORATORS, DecoratorKind
 
 
 class ParallelOptions(NodeParameters):
     """When a parallel succeeds; it fails as soon as one child fails."""
 
-    succeed_when: Literal["all", "one"] = Field(
-        description="all: every child succeeds in the same tick; one: at least one does."
+    succeed_when: Literal["all", "one"] | Annotated[tuple[str, ...], Field(min_length=1)] = Field(
+        description="all: every child succeeds; one: at least one does; a list of names: these do."
     )
-
-
-class RetryOptions(NodeParameters):
-    """How often to try."""
-
-    attempts: int = Field(ge=1, description="Number of failures after which it fails.")
-
-
-class RepeatOptions(NodeParameters):
-    """How often to repeat."""
-
-    times: int = Field(ge=1, description="Number of successes after which it succeeds.")
+    synchronise: bool = Field(
+        default=False,
+        description="Whether a child that succeeded is not asked again until all have. Never do "
+        "this to a guard.",
+    )
 
 
 @dataclass(frozen=True)
 class Kind:
     """A kind of inner node. ``holds``: the key under which its children stand, None for none.
 
-    ``build(name, options, children)`` makes the py_trees behaviour.
+    ``build(name, options, children)`` makes the py_trees behaviour. ``objection(options, names)``
+    says in words why the options do not suit children of these names; None if they do.
     """
 
     name: str
@@ -54,16 +50,44 @@ class Kind:
     description: str
     build: Callable[[str, Any, list[Behaviour]], Behaviour]
     options: type[NodeParameters] = NoParameters
+    objection: Callable[[Any, Collection[str]], str | None] = lambda _options, _names: None
 
 
 def _parallel(name: str, options: ParallelOptions, children: list[Behaviour]) -> Behaviour:
-    # A synchronised policy would skip a guard that succeeded once, so it is not offered.
     policy: ParallelPolicy.Base
     if options.succeed_when == "all":
-        policy = ParallelPolicy.SuccessOnAll(synchronise=False)
-    else:
+        policy = ParallelPolicy.SuccessOnAll(synchronise=options.synchronise)
+    elif options.succeed_when == "one":
         policy = ParallelPolicy.SuccessOnOne()
+    else:
+        selected = [child for child in children if child.name in options.succeed_when]
+        policy = ParallelPolicy.SuccessOnSelected(selected, synchronise=options.synchronise)
     return composites.Parallel(name, policy, children)
+
+
+def _parallel_objection(options: ParallelOptions, names: Collection[str]) -> str | None:
+    if options.succeed_when == "one":
+        return (
+            "parallel.synchronise has no meaning with succeed_when: one"
+            if options.synchronise
+            else None
+        )
+    if options.succeed_when == "all":
+        return None
+    strange = next((name for name in options.succeed_when if name not in names), None)
+    if strange is None:
+        return None
+    return f"parallel.succeed_when: no child is called {strange!r}{did_you_mean(strange, names)}"
+
+
+def _decorating(kind: DecoratorKind) -> Kind:
+    return Kind(
+        kind.name,
+        "child",
+        kind.description,
+        lambda name, options, children: kind.build(name, options, children[0]),
+        kind.options,
+    )
 
 
 _KINDS = (
@@ -100,33 +124,9 @@ _KINDS = (
         "motion: the children beside it are still ticked once when it trips.",
         _parallel,
         ParallelOptions,
+        _parallel_objection,
     ),
-    Kind(
-        "invert",
-        "child",
-        "Fails when its child succeeds and succeeds when it fails.",
-        lambda name, _, children: decorators.Inverter(name, children[0]),
-    ),
-    Kind(
-        "ignore_failure",
-        "child",
-        "Succeeds also when its child fails.",
-        lambda name, _, children: decorators.FailureIsSuccess(name, children[0]),
-    ),
-    Kind(
-        "retry",
-        "child",
-        "Starts its child again when it fails, up to a number of attempts.",
-        lambda name, o, children: decorators.Retry(name, children[0], num_failures=o.attempts),
-        RetryOptions,
-    ),
-    Kind(
-        "repeat",
-        "child",
-        "Starts its child again when it succeeds, a number of times; fails when it fails.",
-        lambda name, o, children: decorators.Repeat(name, children[0], num_success=o.times),
-        RepeatOptions,
-    ),
+    *map(_decorating, DECORATORS.values()),
     Kind(
         "plan_slot",
         None,
@@ -154,12 +154,5 @@ def kind_of(behaviour: Behaviour) -> str:
             return "selector" if behaviour.memory else "reactive_selector"
         case composites.Parallel():
             return "parallel"
-        case decorators.Inverter():
-            return "invert"
-        case decorators.FailureIsSuccess():
-            return "ignore_failure"
-        case decorators.Retry():
-            return "retry"
-        case decorators.Repeat():
-            return "repeat"
-    return type(behaviour).__name__
+    by_class = {kind.behaviour: kind.name for kind in DECORATORS.values()}
+    return by_class.get(type(behaviour), type(behaviour).__name__)

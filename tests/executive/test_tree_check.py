@@ -7,12 +7,11 @@ import pytest
 from py_trees.common import Status
 
 from defras_bt.executive.loader import build_tree
-from defras_bt.executive.node import NoParameters
 from defras_bt.executive.tree_check import check_tree, guards
 from defras_bt.executive.tree_file import read_tree
-from defras_bt.executive.tree_kinds import KINDS
-from defras_bt.executive.tree_spec import NodeSpec, TreeSpec
+from defras_bt.executive.tree_spec import TreeSpec
 from defras_sim.yaml_source import InvalidFile
+from tests.executive.random_trees import INNER, random_spec, spec_of
 
 SAFE = [
     "reactive: {children: [Watch, Push]}",
@@ -20,6 +19,7 @@ SAFE = [
     "reactive: {children: [{reactive: {children: [Think, Watch]}}, {plan_slot: {name: act}}]}",
     "reactive: {children: [{selector: {children: [Watch, {Watch: {name: b}}]}}, Push]}",
     "reactive: {children: [{parallel: {succeed_when: all, children: [Think, Watch]}}, Push]}",
+    "reactive: {children: [{parallel: {succeed_when: [watch], children: [Think, Watch]}}, Push]}",
     "sequence: {children: [Think, {reactive: {children: [Watch, {retry: {attempts: 2, "
     "child: Push}}]}}]}",
 ]
@@ -37,6 +37,10 @@ UNSAFE = [
     "reactive: {children: [{selector: {children: [Watch, Think]}}, Push]}",
     "reactive: {children: [{parallel: {succeed_when: one, children: [Watch, Think]}}, Push]}",
     "reactive: {children: [Think, {reactive: {children: [Push]}}]}",
+    "reactive: {children: [{parallel: {succeed_when: all, synchronise: true, "
+    "children: [Watch, Think]}}, Push]}",
+    "reactive: {children: [{parallel: {succeed_when: [think], children: [Watch, Think]}}, Push]}",
+    "reactive: {children: [{once: {child: Watch}}, Push]}",
 ]
 
 
@@ -69,30 +73,8 @@ def test_a_tree_has_one_plan_slot(write_tree, toys):
 
 # The check against py_trees itself: random trees, random answers of every leaf.
 
-OPTIONS = {
-    "parallel": lambda chance: {"succeed_when": chance.choice(["all", "one"])},
-    "retry": lambda chance: {"attempts": chance.randint(1, 3)},
-    "repeat": lambda chance: {"times": chance.randint(1, 3)},
-}
 # Mostly reactive, or few of the trees would be guarded at all.
-INNER = [kind.name for kind in KINDS.values() if kind.holds] + ["reactive"] * 6
-
-
-def spec_of(toys, kind, children=(), **options):
-    leaf = toys.registry.nodes().get(kind)
-    made = NoParameters() if leaf else KINDS[kind].options(**options)
-    return NodeSpec(kind, "n", ("tree.yaml", 1, 1), made, tuple(children), leaf)
-
-
-def random_spec(toys, chance, depth=0):
-    if depth == 4 or (depth and chance.random() < 0.4):
-        return spec_of(toys, chance.choice(["Watch", "Watch", "Push", "Think"]))
-    kind = chance.choice(INNER)
-    amount = chance.randint(1, 4) if KINDS[kind].holds == "children" else 1
-    children = [random_spec(toys, chance, depth + 1) for _ in range(amount)]
-    if kind == "reactive" and chance.random() < 0.6:
-        children.insert(0, spec_of(toys, "Watch"))
-    return spec_of(toys, kind, children, **OPTIONS.get(kind, lambda _: {})(chance))
+MANY_REACTIVE = (*INNER, *["reactive"] * 14)
 
 
 def guards_before(behaviour, toys):
@@ -141,7 +123,7 @@ def test_the_check_agrees_with_what_py_trees_does(toys):
     chance = random.Random(1)
     ticked, breached = {True: 0, False: 0}, {True: 0, False: 0}
     for _ in range(2500):
-        spec = random_spec(toys, chance)
+        spec = random_spec(toys.registry, chance, inner=MANY_REACTIVE, guard_first=0.6)
         accepted = not list(check_tree(spec, ()))
         root = build_tree(TreeSpec("n", "", spec), Chance(chance)).root
         motions, wrong = breaches(root, toys, ticks=5)
@@ -153,8 +135,8 @@ def test_the_check_agrees_with_what_py_trees_does(toys):
 
 
 def test_what_counts_as_a_guard(toys):
-    watch, think = spec_of(toys, "Watch"), spec_of(toys, "Think")
+    watch, think = spec_of(toys.registry, "Watch"), spec_of(toys.registry, "Think")
     assert guards(watch)
     assert not guards(think)
-    assert guards(spec_of(toys, "reactive_selector", [watch, watch]))
-    assert not guards(spec_of(toys, "retry", [watch], attempts=2))
+    assert guards(spec_of(toys.registry, "reactive_selector", [watch, watch]))
+    assert not guards(spec_of(toys.registry, "retry", [watch], attempts=2))

@@ -95,6 +95,15 @@ tree:
         (["    - selector: {children: Think}"], "5:18: selector.children is empty or no list"),
         (["    - parallel: {children: [Think]}"], "5:7: parallel.succeed_when: Field required"),
         (
+            ["    - parallel: {succeed_when: [thing], children: [Think]}"],
+            "5:7: parallel.succeed_when: no child is called 'thing'; did you mean think?",
+        ),
+        (
+            ["    - parallel: {succeed_when: one, synchronise: true, children: [Think]}"],
+            "5:7: parallel.synchronise has no meaning with succeed_when: one",
+        ),
+        (["    - time_out: {ticks: 0.5, child: Think}"], "5:18: time_out.ticks: Input should be"),
+        (
             ["    - Think", "    - Mend", "    - Think"],
             "7:7: a second child called 'think' (see line 5); give one of them another name",
         ),
@@ -197,6 +206,9 @@ options = {
     "parallel": st.fixed_dictionaries({"succeed_when": st.sampled_from(["all", "one"])}),
     "retry": st.fixed_dictionaries({"attempts": st.integers(1, 9)}),
     "repeat": st.fixed_dictionaries({"times": st.integers(1, 9)}),
+    "time_out": st.fixed_dictionaries({"ticks": st.integers(1, 9)}),
+    "once": st.fixed_dictionaries({}, optional={"until": st.just("completion")}),
+    "wait_for": st.fixed_dictionaries({"status": st.sampled_from(["success", "failure"])}),
 }
 leaf_data = st.one_of(
     st.sampled_from(["Think", "Watch", "Mend"]).map(lambda leaf: {leaf: {}}),

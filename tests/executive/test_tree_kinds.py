@@ -87,7 +87,24 @@ def test_parallel_looks_again_at_what_succeeded(tick):
     assert [status for _, status in ticks] == [R, F]
 
 
-@pytest.mark.parametrize(("policy", "status"), [("all", R), ("one", S)])
+def test_a_synchronised_parallel_does_not_look_again(tick):
+    text = "parallel: {succeed_when: all, synchronise: true, children: [Think, Mend]}"
+    ticks = tick(text, {"think": [S, F], "mend": [R]}, 2)
+    assert ("think", "FAILURE") not in ticks[1][0]
+    assert [status for _, status in ticks] == [R, R]
+
+
+@pytest.mark.parametrize("kind", ["running_is_failure", "time_out"])
+def test_what_takes_too_long_is_stopped_in_the_same_tick(tick, kind):
+    options = "ticks: 1, " if kind == "time_out" else ""
+    ((log, status),) = tick(f"{kind}: {{{options}child: Mend}}", {"mend": [R]}, 1)
+    assert log == [("mend", "RUNNING"), ("mend", "ends INVALID")]
+    assert status == F
+
+
+@pytest.mark.parametrize(
+    ("policy", "status"), [("all", R), ("one", S), ("[think]", S), ("[mend]", R)]
+)
 def test_when_parallel_succeeds(tick, policy, status):
     text = f"parallel: {{succeed_when: {policy}, children: [Think, Mend]}}"
     assert tick(text, {"mend": [R]}, 1)[0][1] == status
@@ -105,6 +122,18 @@ def test_when_parallel_succeeds(tick, policy, status):
         ("retry: {attempts: 1, child: Think}", [F], [F]),
         ("repeat: {times: 2, child: Think}", [S, R, S], [R, R, S]),
         ("repeat: {times: 2, child: Think}", [S, F], [R, F]),
+        ("success_is_failure: {child: Think}", [S], [F]),
+        ("success_is_running: {child: Think}", [S, F], [R, F]),
+        ("failure_is_running: {child: Think}", [F, S], [R, S]),
+        ("running_is_failure: {child: Think}", [R, S], [F, S]),
+        ("running_is_success: {child: Think}", [R, F], [S, F]),
+        ("time_out: {ticks: 3, child: Think}", [R, R, R, R], [R, R, F, R]),
+        ("time_out: {ticks: 3, child: Think}", [R, S, R, R, R], [R, S, R, R, F]),
+        ("time_out: {ticks: 1, child: Think}", [R, S], [F, S]),
+        ("once: {child: Think}", [R, F, S, F], [R, F, S, S]),
+        ("once: {until: completion, child: Think}", [R, F, S], [R, F, F]),
+        ("wait_for: {status: failure, child: Think}", [R, S, F, S], [R, R, S, R]),
+        ("wait_for: {status: success, child: Think}", [F, S], [R, S]),
     ],
 )
 def test_decorators(tick, text, child, expected):
@@ -123,6 +152,8 @@ def test_every_kind_is_recognised_in_the_tree(kind):
         "parallel": {"succeed_when": "one"},
         "retry": {"attempts": 2},
         "repeat": {"times": 2},
+        "time_out": {"ticks": 2},
+        "wait_for": {"status": "failure"},
     }
     made = KINDS[kind].options(**options.get(kind, {}))
     children = [py_trees.behaviours.Dummy()] if KINDS[kind].holds else []
