@@ -32,7 +32,8 @@ class Part(BaseModel):
 class Tissue(Part):
     """The slab, its material, and the finite-element mesh the twin uses for it.
 
-    ``bed``: whether a rigid, frictionless bed lies right under it.
+    ``bed``: whether a rigid, frictionless bed lies right under it. Gravity pulls along -z; the
+    paper's scenes have none.
     """
 
     length_x_m: Side = 0.12
@@ -40,6 +41,8 @@ class Tissue(Part):
     thickness_m: Side = 0.005
     young_modulus_pa: Annotated[float, Field(gt=0, le=1e7)] = 3000.0
     poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = 0.45
+    density_kg_m3: Annotated[float, Field(ge=100, le=5000)] = 1000.0
+    gravity_m_s2: Annotated[float, Field(ge=0, le=20)] = 0.0
     material: MaterialName = "neo_hookean"
     element: ElementName = "hexahedron20"
     elements_xyz: tuple[int, int, int] = (8, 8, 1)

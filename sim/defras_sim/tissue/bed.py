@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from defras_sim.geometry import Floats
 from defras_sim.scene import Tissue
-from defras_sim.tissue.mesh import Mesh
+from defras_sim.tissue.layout import Places, add_blocks
+from defras_sim.tissue.mesh import Integers, Mesh
+from defras_sim.tissue.terms import diagonal_pairs, unknown_parameter
 
 # Pressure per depth. A retraction presses with a few hundred pascal at most, which then costs a
 # few tenths of a millimetre.
@@ -22,13 +25,23 @@ ONSET_M = 5e-4
 
 @dataclass(frozen=True)
 class Bed:
-    """A unilateral penalty on the depth of the nodes below ``height_m``.
+    """A boundary term: a unilateral penalty on the depth of the nodes below ``height_m``.
 
-    ``stiffness_n_per_m`` (nodes,) is each node's share of the pressure.
+    ``stiffness_n_per_m`` (nodes,) is each node's share of the pressure. Its parameter is the
+    height.
     """
 
     height_m: float
     stiffness_n_per_m: Floats
+    name: str = "bed"
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        return ("height_m",)
+
+    @cached_property
+    def pairs(self) -> Integers:
+        return diagonal_pairs(len(self.stiffness_n_per_m))
 
     def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
         """Energy [J] and its gradient (nodes, 3) [N]; zero above the bed."""
@@ -42,12 +55,21 @@ class Bed:
         gradient[:, 2] = -self.stiffness_n_per_m * force
         return float(self.stiffness_n_per_m @ energy), gradient
 
-    def tangent_diagonal(self, positions_m: Floats) -> Floats:
-        """Diagonal (3 nodes,) of the second derivative [N/m]; the rest of it is zero."""
-        share = np.minimum(self._depth_m(positions_m) / ONSET_M, 1.0)
-        diagonal = np.zeros_like(positions_m)
-        diagonal[:, 2] = self.stiffness_n_per_m * share
-        return diagonal.ravel()
+    def add_tangent(self, positions_m: Floats, places: Places, entries: Floats) -> None:
+        blocks = np.zeros((len(positions_m), 3, 3))
+        blocks[:, 2, 2] = self._stiffness_now_n_per_m(positions_m)
+        add_blocks(blocks, places, entries)
+
+    def gradient_by(self, parameter: str, positions_m: Floats) -> Floats:
+        if parameter not in self.parameters:
+            raise unknown_parameter(self, parameter)
+        slope = np.zeros_like(positions_m)
+        slope[:, 2] = -self._stiffness_now_n_per_m(positions_m)
+        return slope
+
+    def _stiffness_now_n_per_m(self, positions_m: Floats) -> Floats:
+        """Second derivative (nodes,) along z; the rest of it is zero."""
+        return self.stiffness_n_per_m * np.minimum(self._depth_m(positions_m) / ONSET_M, 1.0)
 
     def _depth_m(self, positions_m: Floats) -> Floats:
         return np.maximum(0.0, self.height_m - positions_m[:, 2])

@@ -1,84 +1,71 @@
-"""Potential energy of a tissue held by springs; its minima are the static equilibria."""
+"""Potential energy of a tissue as a sum of terms; its minima are the static equilibria."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from scipy import sparse
 
 from defras_sim.geometry import Floats
-from defras_sim.tissue.assembly import ElasticBody
-from defras_sim.tissue.bed import Bed
-from defras_sim.tissue.mesh import Integers
-from defras_sim.tissue.springs import Springs
+from defras_sim.tissue.layout import Places, TangentLayout
+from defras_sim.tissue.terms import Term
 
 
 class PotentialEnergy:
-    """Elastic energy of ``body``, of ``springs`` to ``targets_m`` (rows, 3), and of ``bed``.
+    """The sum of ``terms`` over nodal positions (nodes, 3) [m]; its gradient is in N.
 
-    Without a bed the tissue floats. Unknowns are the nodes' positions (nodes, 3) [m]; the
-    gradient is in N.
+    All terms write into one sparse matrix, laid out when the energy is made. Energies never
+    change; :meth:`with_term` gives another one that shares whatever stays the same.
     """
 
-    def __init__(
-        self, body: ElasticBody, springs: Springs, targets_m: Floats, bed: Bed | None = None
-    ) -> None:
-        self.body = body
-        self.bed = bed
-        self.springs = springs
-        self.targets_m = targets_m
-        held = springs.tangent()
-        # Springs may couple nodes of neighbouring elements: the sum's sparsity holds both.
-        self._pattern = _union(body.pattern, held)
-        self._body_places = _places(body.pattern, self._pattern)
-        self._spring_entries = np.zeros(self._pattern.nnz)
-        self._spring_entries[_places(held, self._pattern)] = held.data
-        self._diagonal_places = _diagonal(self._pattern)
+    def __init__(self, nodes: int, terms: Iterable[Term]) -> None:
+        self.terms: Mapping[str, Term] = {}
+        for term in terms:
+            if term.name in self.terms:
+                raise ValueError(f"two terms are called {term.name!r}; names have to differ")
+            self.terms = {**self.terms, term.name: term}
+        self._nodes = nodes
+        self._layout = TangentLayout.of(nodes, (term.pairs for term in self.terms.values()))
+        self._places: dict[str, Places] = {
+            name: self._layout.places(term.pairs) for name, term in self.terms.items()
+        }
+
+    def with_term(self, term: Term) -> PotentialEnergy:
+        """The energy with ``term`` added, or in the place of the one of its name.
+
+        A term with the same ``pairs`` object as the one before takes its place in the matrix.
+        """
+        old = self.terms.get(term.name)
+        terms = {**self.terms, term.name: term}
+        if old is None or old.pairs is not term.pairs:
+            return PotentialEnergy(self._nodes, terms.values())
+        changed = object.__new__(PotentialEnergy)
+        changed.__dict__.update(self.__dict__, terms=terms)
+        return changed
+
+    def without_term(self, name: str) -> PotentialEnergy:
+        """The energy without the term called ``name``.
+
+        Raises:
+            KeyError: there is none.
+        """
+        rest = [term for other, term in self.terms.items() if other != name]
+        if len(rest) == len(self.terms):
+            raise KeyError(f"no term is called {name!r}; there are: {', '.join(self.terms)}")
+        return PotentialEnergy(self._nodes, rest)
 
     def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
-        elastic, gradient = self.body.energy_and_gradient(positions_m)
-        held, pull = self.springs.energy_and_gradient(positions_m, self.targets_m)
-        if self.bed is None:
-            return elastic + held, gradient + pull
-        pressed, push = self.bed.energy_and_gradient(positions_m)
-        return elastic + held + pressed, gradient + pull + push
+        energy, gradient = 0.0, np.zeros_like(positions_m)
+        for term in self.terms.values():
+            part, slope = term.energy_and_gradient(positions_m)
+            energy += part
+            gradient += slope
+        return energy, gradient
 
     def tangent(self, positions_m: Floats) -> sparse.csc_array:
         """Second derivative (3 nodes, 3 nodes) [N/m], symmetric."""
-        entries = self._spring_entries.copy()
-        entries[self._body_places] += self.body.tangent_entries(positions_m)
-        if self.bed is not None:
-            entries[self._diagonal_places] += self.bed.tangent_diagonal(positions_m)
-        pattern = self._pattern
-        return sparse.csc_array((entries, pattern.indices, pattern.indptr), shape=pattern.shape)
-
-    def force_scale_n(self) -> float:
-        """A force that deforms the whole body by its own size: what residuals are compared to."""
-        size = np.ptp(self.body.mesh.nodes_m, axis=0)
-        return float(np.mean(2 * self.body.mu_pa) * np.prod(size) / size.max())
-
-
-def _union(one: sparse.csc_array, other: sparse.csc_array) -> sparse.csc_array:
-    def ones(matrix: sparse.csc_array) -> sparse.csc_array:
-        entries = np.ones(matrix.nnz)
-        return sparse.csc_array((entries, matrix.indices, matrix.indptr), shape=matrix.shape)
-
-    union = sparse.csc_array(ones(one) + ones(other))
-    union.sort_indices()
-    return union
-
-
-def _places(part: sparse.csc_array, whole: sparse.csc_array) -> Integers:
-    """Where the entries of ``part`` stand among those of ``whole``, which holds all of them."""
-    return np.searchsorted(_keys(whole), _keys(part))
-
-
-def _diagonal(matrix: sparse.csc_array) -> Integers:
-    """Where the diagonal's entries stand among those of ``matrix``."""
-    size = np.int64(matrix.shape[0])
-    return np.searchsorted(_keys(matrix), np.arange(size) * (size + 1))
-
-
-def _keys(matrix: sparse.csc_array) -> Integers:
-    size = np.int64(matrix.shape[0])
-    columns = np.repeat(np.arange(size), np.diff(matrix.indptr))
-    return columns * size + matrix.indices
+        entries = np.zeros(self._layout.pattern.nnz)
+        for name, term in self.terms.items():
+            term.add_tangent(positions_m, self._places[name], entries)
+        return self._layout.matrix(entries)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from defras_sim.geometry import Floats, Pose
 from defras_sim.surface import Surface
 from defras_sim.tissue.mesh import Integers, Mesh, SlabMesh
-from defras_sim.tissue.springs import ROW_SHIFTS, Springs, disc_rows
+from defras_sim.tissue.springs import ROW_SHIFTS, Springs, SpringTerm, disc_rows
 
 # Stiff enough that a patch under 1 N gives 0.1 mm, soft enough not to spoil the conditioning.
 GRASP_N_PER_M = 1e4
@@ -28,24 +28,28 @@ class Grasp:
     """A held patch: its springs, and their targets (rows, 3) as seen from the tip.
 
     ``shifts`` (rows,) says how each held quantity moves with a translation: 1 for positions, 0 for
-    moments. ``tissue_from_rest_tip`` is where the tip would hold the patch without deforming the
-    tissue.
+    moments.
     """
 
     springs: Springs
     shifts: Floats
     tip_targets_m: Floats
     tissue_from_tip: Pose
-    tissue_from_rest_tip: Pose
 
     @property
     def targets_m(self) -> Floats:
         pose = self.tissue_from_tip
         return self.tip_targets_m @ pose.rotation.T + self.shifts[:, None] * pose.position_m
 
-    @property
-    def rows(self) -> int:
-        return len(self.shifts)
+    def term(self, arm: str) -> SpringTerm:
+        """The boundary term by which ``arm`` holds the tissue."""
+        return SpringTerm(term_name(arm), self.springs, self.targets_m)
+
+    def unloaded_tip(self, positions_m: Floats) -> Pose:
+        """Where the tip holds tissue whose nodes lie at ``positions_m`` without pulling at it."""
+        held = np.asarray(self.springs.rows @ positions_m)
+        moved = _nearest_motion if np.all(self.shifts == 1.0) else _patch_motion
+        return moved(self.tip_targets_m, held)
 
     def force_n(self, forces_n: Floats) -> Floats:
         """Net force (3,) on the tissue of the springs' forces (rows, 3)."""
@@ -55,6 +59,11 @@ class Grasp:
         """Their moment (3,) about the tip, where the held quantities are ``held_m`` (rows, 3)."""
         levers = held_m - self.shifts[:, None] * self.tissue_from_tip.position_m
         return np.cross(levers, forces_n).sum(axis=0)
+
+
+def term_name(arm: str) -> str:
+    """What the boundary term of an arm's grasp is called."""
+    return f"grasp of {arm}"
 
 
 def grasped_patch(
@@ -69,22 +78,14 @@ def grasped_patch(
         nodes = nodes_under_jaw(mesh, center_xy_m, radius_m)
         rows = sparse.csr_array(sparse.eye_array(len(mesh.nodes_m), format="csr")[nodes])
         shifts = np.ones(len(nodes))
-        motion = _nearest_motion(mesh.nodes_m[nodes], positions_m[nodes])
     else:
         half = np.ptp(mesh.nodes_m, axis=0)[:2] / 2
         center = np.clip(center_xy_m, radius_m - half, half - radius_m)
         rows, shifts = disc_rows(mesh, center[None], radius_m, 0.0), ROW_SHIFTS
-        motion = _patch_motion(np.asarray(rows @ mesh.nodes_m), np.asarray(rows @ positions_m))
     held = rows @ positions_m
     from_tip = held - shifts[:, None] * tissue_from_tip.position_m
     springs = Springs(rows, np.full(len(shifts), GRASP_N_PER_M))
-    return Grasp(
-        springs,
-        shifts,
-        from_tip @ tissue_from_tip.rotation,
-        tissue_from_tip,
-        motion.inverse() @ tissue_from_tip,
-    )
+    return Grasp(springs, shifts, from_tip @ tissue_from_tip.rotation, tissue_from_tip)
 
 
 def nodes_under_jaw(mesh: SlabMesh, center_xy_m: Floats, radius_m: float) -> Integers:
@@ -145,10 +146,10 @@ def nearest_on_upper_face(
     return best
 
 
-def at_rest(grasps: Mapping[str, Grasp]) -> dict[str, Grasp]:
-    """The same grasps where they do not deform the tissue."""
+def unloaded(grasps: Mapping[str, Grasp], positions_m: Floats) -> dict[str, Grasp]:
+    """The same grasps where they do not pull at tissue that lies at ``positions_m``."""
     return {
-        arm: replace(grasp, tissue_from_tip=grasp.tissue_from_rest_tip)
+        arm: replace(grasp, tissue_from_tip=grasp.unloaded_tip(positions_m))
         for arm, grasp in grasps.items()
     }
 

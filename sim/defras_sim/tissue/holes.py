@@ -8,13 +8,16 @@ from scipy import sparse
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene, hole_stiffness_n_per_m
 from defras_sim.tissue.mesh import Integers, Mesh
-from defras_sim.tissue.springs import ROWS, Springs, disc_rows
+from defras_sim.tissue.springs import ROWS, Springs, SpringTerm, disc_rows
+
+TERM_NAME = "attachments"
 
 
 class Holes:
     """All holes of a scene on a mesh, in the order of ``scene.holes_xy_m``.
 
-    ``targets_m`` (3 holes, 3) is what their springs hold the tissue at: its shape at rest.
+    ``targets_m`` (3 holes, 3) is what their springs hold the tissue at: its shape at rest, which is
+    the mesh's own unless :meth:`anchor_at` says otherwise.
     """
 
     def __init__(self, mesh: Mesh, scene: Scene) -> None:
@@ -22,28 +25,36 @@ class Holes:
             mesh, scene.holes_xy_m, scene.attachments.hole_radius_m, -scene.tissue.thickness_m
         )
         self.targets_m: Floats = self._rows @ mesh.nodes_m
-        self._stiffness = hole_stiffness_n_per_m(scene.attached)
+        self._springs = self._with_stiffness(hole_stiffness_n_per_m(scene.attached))
+
+    def anchor_at(self, positions_m: Floats) -> None:
+        """Hold the tissue from now on where it is when its nodes lie at ``positions_m``."""
+        self.targets_m = self._rows @ positions_m
 
     @property
     def stiffness_n_per_m(self) -> Floats:
         """Stiffness of every hole (holes,); zero is free."""
-        return self._stiffness.copy()
+        return self._springs.stiffness_n_per_m[::ROWS].copy()
 
     @stiffness_n_per_m.setter
     def stiffness_n_per_m(self, stiffness_n_per_m: Floats) -> None:
         stiffness = np.array(stiffness_n_per_m, dtype=float)
-        if stiffness.shape != self._stiffness.shape:
+        holes = self._rows.shape[0] // ROWS
+        if stiffness.shape != (holes,):
             raise ValueError(
-                f"hole stiffness has shape {stiffness.shape}; the scene has "
-                f"{len(self._stiffness)} holes"
+                f"hole stiffness has shape {stiffness.shape}; the scene has {holes} holes"
             )
         if not np.all(np.isfinite(stiffness) & (stiffness >= 0)):
             raise ValueError("hole stiffness should be finite and at least 0 N/m")
-        self._stiffness = stiffness
+        self._springs = self._with_stiffness(stiffness)
 
     @property
-    def springs(self) -> Springs:
-        return Springs(self._rows, np.repeat(self._stiffness, ROWS))
+    def term(self) -> SpringTerm:
+        """The boundary term by which the holes hold the tissue."""
+        return SpringTerm(TERM_NAME, self._springs, self.targets_m)
+
+    def _with_stiffness(self, stiffness_n_per_m: Floats) -> Springs:
+        return Springs(self._rows, np.repeat(stiffness_n_per_m, ROWS))
 
     def rows_of(self, holes: Integers) -> tuple[sparse.csr_array, Floats]:
         """What some holes hold: rows (3 holes, nodes), and targets (3 holes, 3) of those."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from defras_sim.geometry import Floats
 from defras_sim.tissue import materials
-from defras_sim.tissue.matrices import cofactor, jacobi_eigen, jit
+from defras_sim.tissue.matrices import jit
 from defras_sim.tissue.mesh import Integers
 
 
@@ -120,35 +120,8 @@ def tangent(
 
 
 @jit
-def largest_principal_stress(
-    code: int,
-    positions: Floats,
-    connectivity: Integers,
-    gradients: Floats,
-    mu: Floats,
-    lam: Floats,
-) -> tuple[float, int, int]:
-    """Largest principal Cauchy stress, and the element and quadrature point where it acts."""
-    elements, points, _, width = gradients.shape
-    local = np.empty((3, width))
-    F = np.empty((3, 3))
-    P = np.empty((3, 3))
-    sigma = np.empty((3, 3))
-    V = np.empty((3, 3))
-    largest, at_element, at_point = -np.inf, 0, 0
-    for e in range(elements):
-        for a in range(width):
-            for i in range(3):
-                local[i, a] = positions[connectivity[e, a], i]
-        for q in range(points):
-            _deformation(gradients[e, q], local, F)
-            J = cofactor(F, sigma)
-            materials.stress(code, F, mu[e, q], lam[e, q], P)
-            for i in range(3):
-                for j in range(3):
-                    sigma[i, j] = (P[i, 0] * F[j, 0] + P[i, 1] * F[j, 1] + P[i, 2] * F[j, 2]) / J
-            jacobi_eigen(sigma, V)
-            value = max(sigma[0, 0], sigma[1, 1], sigma[2, 2])
-            if value > largest:
-                largest, at_element, at_point = value, e, q
-    return largest, at_element, at_point
+def stresses(code: int, F: Floats, mu: Floats, lam: Floats, out: Floats) -> None:
+    """Write the first Piola stress of every F (elements, points, 3, 3) to ``out``."""
+    for e in range(F.shape[0]):
+        for q in range(F.shape[1]):
+            materials.stress(code, F[e, q], mu[e, q], lam[e, q], out[e, q])

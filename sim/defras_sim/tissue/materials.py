@@ -39,6 +39,20 @@ def lame_parameters(
     return mu, lam
 
 
+def lame_by_poisson(material: MaterialName, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:
+    """Derivatives of what :func:`lame_parameters` gives by Poisson's ratio at fixed E [Pa]."""
+    if material == "stable_neo_hookean":
+        mu = 3 / 4 * mu
+        lam = lam - 5 / 6 * mu
+    nu = lam / (2 * (lam + mu))
+    young = 2 * mu * (1 + nu)
+    mu_by = -young / (2 * (1 + nu) ** 2)
+    lam_by = young * (1 + 2 * nu**2) / ((1 + nu) * (1 - 2 * nu)) ** 2
+    if material == "stable_neo_hookean":
+        return 4 / 3 * mu_by, lam_by + 5 / 6 * mu_by
+    return mu_by, lam_by
+
+
 @jit
 def stress(code: int, F: Floats, mu: float, lam: float, P: Floats) -> float:
     """Write the first Piola stress to ``P`` (3, 3); return the energy density [J/m^3]."""

@@ -1,35 +1,33 @@
-"""The tissue model: one soft slab, held from below by attachments and from above by grasps."""
+"""The tissue model: one soft body, held from below by attachments and from above by grasps."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import ElementName, MaterialName, Scene
+from defras_sim.tissue import grasp as grips
+from defras_sim.tissue import holes as attachments
 from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.bed import bed_under
 from defras_sim.tissue.equilibrium import PotentialEnergy
-from defras_sim.tissue.grasp import (
-    Grasp,
-    NothingToGrasp,
-    at_rest,
-    grasped_patch,
-    nearest_on_upper_face,
-    spring_order,
-)
+from defras_sim.tissue.grasp import Grasp, NothingToGrasp
 from defras_sim.tissue.hole_response import HoleResponse
 from defras_sim.tissue.holes import Holes
+from defras_sim.tissue.loads import gravity
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import Integers, slab_mesh
 from defras_sim.tissue.path import length_m
 from defras_sim.tissue.readout import tissue_state
+from defras_sim.tissue.rest import is_loaded, lying_m, settled
 from defras_sim.tissue.solver import NewtonSettings, NewtonSolver
-from defras_sim.tissue.springs import ROWS, joined
+from defras_sim.tissue.springs import ROWS
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.surface import surface_map
+from defras_sim.tissue.terms import Term
 from defras_sim.tissue.travel import Tips, Traveller
 
 __all__ = ["NothingToGrasp", "TissueModel", "TissueSnapshot"]
@@ -44,7 +42,12 @@ class TissueSnapshot:
 
 
 class TissueModel:
-    """Quasi-static tissue of a scene. Not thread-safe; use one model a thread."""
+    """Quasi-static tissue of a scene. Not thread-safe; use one model a thread.
+
+    Its energy is the sum of ``terms``: "material", "gravity" (of strength zero unless the scene has
+    some), "bed" where there is one, "attachments", a "grasp of ..." for each arm that holds, and
+    whatever :meth:`set_term` adds.
+    """
 
     def __init__(
         self,
@@ -62,15 +65,65 @@ class TissueModel:
         )
         name = material or tissue.material
         mu, lam = lame_parameters(name, tissue.young_modulus_pa, tissue.poisson_ratio)
-        self._body = ElasticBody(self.mesh, name, mu, lam)
-        self._bed = bed_under(self.mesh, tissue) if tissue.bed else None
+        body = ElasticBody(self.mesh, name, mu, lam)
+        self._terms: dict[str, Term] = {
+            term.name: term
+            for term in (body, gravity(body.points, tissue.density_kg_m3, tissue.gravity_m_s2))
+        }
+        if tissue.bed:
+            bed = bed_under(self.mesh, tissue)
+            self._terms[bed.name] = bed
         self._surface = surface_map(self.mesh, tissue)
         self._holes = Holes(self.mesh, scene)
-        self._positions_m = self.mesh.nodes_m.copy()
         self._grasps: dict[str, Grasp] = {}
-        self._energy = self._assembled()
-        self._solver = NewtonSolver(NewtonSettings(residual_share * self._energy.force_scale_n()))
+        self._solver = NewtonSolver(NewtonSettings(residual_share * body.force_scale_n()))
         self._traveller = Traveller(self._solver, self._energy_at)
+        self._rest_m: Floats = self.mesh.nodes_m
+        if tissue.bed and is_loaded(self._terms.values()):
+            # Attachments grew where the tissue lies: there they do not pull at it.
+            self._rest_m = lying_m(self._solver, self.mesh.nodes_m, self._terms.values())
+            self._holes.anchor_at(self._rest_m)
+        self._rest_is_known = False
+        self._energy = self._assembled()
+        self._positions_m = self.rest_m.copy()
+
+    @property
+    def terms(self) -> Mapping[str, Term]:
+        """What the energy is the sum of, by name."""
+        return self._energy.terms
+
+    def set_term(self, term: Term) -> None:
+        """Add ``term``, or put it in the place of the one of its name; then solve again.
+
+        Raises:
+            ValueError: the name is that of the attachments or of a grasp, which follow the holes
+                and the arms.
+        """
+        if term.name == attachments.TERM_NAME or term.name in map(grips.term_name, self._grasps):
+            raise ValueError(
+                f"term {term.name!r} follows the holes and the arms; use set_hole_stiffness, "
+                "grasp, release and solve"
+            )
+        old = self._terms.get(term.name)
+        self._terms[term.name] = term
+        self._rest_is_known = False
+        if old is not None and old.pairs is term.pairs:
+            self._energy = self._energy.with_term(term)
+        else:
+            self._changed()
+
+    def remove_term(self, name: str) -> None:
+        """Take away a term that was added.
+
+        Raises:
+            ValueError: there is none of that name, or the tissue cannot be without it.
+        """
+        if name == "material" or name not in self._terms:
+            known = ", ".join(other for other in self._terms if other != "material")
+            raise ValueError(f"no term {name!r} to take away; there are: {known}")
+        del self._terms[name]
+        self._rest_is_known = False
+        self._changed()
 
     @property
     def hole_stiffness_n_per_m(self) -> Floats:
@@ -84,7 +137,20 @@ class TissueModel:
             ValueError: wrong count, negative, or not finite.
         """
         self._holes.stiffness_n_per_m = stiffness_n_per_m
+        self._rest_is_known = False
         self._changed()
+
+    @property
+    def rest_m(self) -> Floats:
+        """Nodes (nodes, 3) where nobody holds the tissue: the mesh's own unless loads act.
+
+        The lowest positions found, where that is no equilibrium.
+        """
+        if not self._rest_is_known:
+            energy = PotentialEnergy(len(self.mesh.nodes_m), self._terms_but_grasps())
+            self._rest_m = settled(self._solver, energy, self._rest_m).positions_m
+            self._rest_is_known = True
+        return self._rest_m
 
     @property
     def grasped_arms(self) -> tuple[str, ...]:
@@ -100,17 +166,18 @@ class TissueModel:
         if arm in self._grasps:
             raise ValueError(f"{arm} holds tissue already; release it first")
         surface = self._surface.surface(self._positions_m)
-        center = nearest_on_upper_face(
+        center = grips.nearest_on_upper_face(
             self.mesh, self._positions_m, surface, tissue_from_tip.position_m
         )
         radius = self.scene.grasp.patch_radius_m
-        self._grasps[arm] = grasped_patch(
+        self._grasps[arm] = grips.grasped_patch(
             self.mesh, self._positions_m, center, radius, tissue_from_tip
         )
         self._changed()
 
     def release(self, arm: str) -> None:
-        """Let go. Without any grasp nothing loads the tissue, and it returns to rest.
+        """Let go. Tissue that nobody holds goes back to rest, unless loads keep it elsewhere: then
+        it settles from where it is.
 
         Raises:
             ValueError: the arm holds nothing.
@@ -118,20 +185,24 @@ class TissueModel:
         if arm not in self._grasps:
             raise ValueError(f"{arm} holds no tissue; holding: {', '.join(self._grasps) or 'none'}")
         del self._grasps[arm]
-        if not self._grasps:
-            self._positions_m = self.mesh.nodes_m.copy()
         self._changed()
+        if self._grasps:
+            return
+        if is_loaded(self._terms.values()):
+            self._positions_m = settled(self._solver, self._energy, self._positions_m).positions_m
+        else:
+            self._positions_m = self.rest_m.copy()
 
     def reset(self) -> None:
         """Rest shape, nothing grasped."""
-        self.restore(TissueSnapshot(self.mesh.nodes_m, {}))
+        self.restore(TissueSnapshot(self.rest_m, {}))
 
     def snapshot(self) -> TissueSnapshot:
         return TissueSnapshot(self._positions_m.copy(), dict(self._grasps))
 
     def restore(self, snapshot: TissueSnapshot) -> None:
-        """Go back to ``snapshot``; the holes keep their present stiffness."""
-        others = spring_order(snapshot.grasps) != spring_order(self._grasps)
+        """Go back to ``snapshot``; holes and terms stay as they are now."""
+        others = grips.spring_order(snapshot.grasps) != grips.spring_order(self._grasps)
         self._grasps = dict(snapshot.grasps)
         if others:
             self._changed()
@@ -151,7 +222,7 @@ class TissueModel:
         moving = length_m(self._tips(), tips) > 0
         converged, iterations = self._travel(tips)
         if not converged and not moving:
-            self._place(TissueSnapshot(self.mesh.nodes_m, at_rest(self._grasps)))
+            self._place(TissueSnapshot(self.rest_m, grips.unloaded(self._grasps, self.rest_m)))
             converged, more = self._travel(tips)
             iterations += more
             if not converged:
@@ -179,12 +250,12 @@ class TissueModel:
         self._energy = self._assembled()
 
     def _assembled(self) -> PotentialEnergy:
-        springs = [self._holes.springs, *(grasp.springs for grasp in self._grasps.values())]
-        return PotentialEnergy(self._body, joined(springs), self._targets_m(), self._bed)
+        held = [grasp.term(arm) for arm, grasp in self._grasps.items()]
+        return PotentialEnergy(len(self.mesh.nodes_m), [*self._terms_but_grasps(), *held])
 
-    def _targets_m(self) -> Floats:
-        held = [grasp.targets_m for grasp in self._grasps.values()]
-        return np.concatenate([self._holes.targets_m, *held])
+    def _terms_but_grasps(self) -> Iterator[Term]:
+        yield from self._terms.values()
+        yield self._holes.term
 
     def _tips(self) -> dict[str, Pose]:
         return {arm: grasp.tissue_from_tip for arm, grasp in self._grasps.items()}
@@ -192,23 +263,28 @@ class TissueModel:
     def _place(self, snapshot: TissueSnapshot) -> None:
         self._positions_m = snapshot.positions_m.copy()
         self._grasps = dict(snapshot.grasps)
-        self._energy.targets_m = self._targets_m()
+        self._energy = self._energy_at(self._tips())
         self._traveller.forget()
 
     def _travel(self, tips: Tips) -> tuple[bool, int]:
         """Go towards ``tips`` as far as there are equilibria; (arrived, iterations)."""
         arrival = self._traveller.go(self._positions_m, self._tips(), tips)
         self._positions_m = arrival.positions_m
-        self._energy_at(arrival.tips)
+        self._grasps = self._grasps_at(arrival.tips)
+        self._energy = self._energy_at(arrival.tips)
         return arrival.arrived, arrival.iterations
+
+    def _grasps_at(self, tips: Tips) -> dict[str, Grasp]:
+        return {
+            arm: replace(grasp, tissue_from_tip=tips[arm]) for arm, grasp in self._grasps.items()
+        }
 
     def _energy_at(self, tips: Tips) -> PotentialEnergy:
         """The energy with each holding arm's tip at its pose in ``tips``."""
-        self._grasps = {
-            arm: replace(grasp, tissue_from_tip=tips[arm]) for arm, grasp in self._grasps.items()
-        }
-        self._energy.targets_m = self._targets_m()
-        return self._energy
+        energy = self._energy
+        for arm, grasp in self._grasps_at(tips).items():
+            energy = energy.with_term(grasp.term(arm))
+        return energy
 
     def _check(self, tips: Tips) -> None:
         if set(tips) != set(self._grasps):
@@ -221,5 +297,11 @@ class TissueModel:
 
     def _state(self, converged: bool, iterations: int) -> TissueState:
         return tissue_state(
-            self._energy, self._positions_m, self._grasps, self._surface, converged, iterations
+            self._energy.terms.values(),
+            self._holes.term,
+            self._grasps,
+            self._positions_m,
+            self._surface,
+            converged=converged,
+            iterations=iterations,
         )

@@ -2,48 +2,75 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from defras_sim.geometry import Floats
-from defras_sim.tissue.equilibrium import PotentialEnergy
+from defras_sim.tissue import integration
+from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.grasp import Grasp
-from defras_sim.tissue.springs import net_force
-from defras_sim.tissue.state import TissueState
+from defras_sim.tissue.material_points import MaterialTerm
+from defras_sim.tissue.springs import SpringTerm, net_force
+from defras_sim.tissue.state import TissueState, Wrench
 from defras_sim.tissue.surface import SurfaceMap
+from defras_sim.tissue.terms import Term
 
 
 def tissue_state(
-    energy: PotentialEnergy,
-    positions_m: Floats,
+    terms: Iterable[Term],
+    attachments: SpringTerm,
     grasps: Mapping[str, Grasp],
+    positions_m: Floats,
     surface: SurfaceMap,
+    *,
     converged: bool,
     iterations: int,
 ) -> TissueState:
-    """The state with the nodes at ``positions_m`` (nodes, 3).
-
-    The springs of ``energy`` are those of the holes, then those of ``grasps`` in their order.
-    """
-    springs = energy.springs
-    forces = springs.forces(positions_m, energy.targets_m)
-    held = springs.rows @ positions_m
-    holes = len(forces) - sum(grasp.rows for grasp in grasps.values())
-    grasp_forces, grasp_moments, first = {}, {}, holes
+    """Read everything off the equilibrium ``positions_m`` (nodes, 3) of ``terms``."""
+    terms = list(terms)
+    forces, moments = {}, {}
     for arm, grasp in grasps.items():
-        mine = slice(first, first + grasp.rows)
-        grasp_forces[arm] = grasp.force_n(forces[mine])
-        grasp_moments[arm] = grasp.moment_nm(forces[mine], held[mine])
-        first += grasp.rows
-    peak = energy.body.largest_principal_stress(positions_m)
+        pull = grasp.term(arm).forces_n(positions_m)
+        forces[arm] = grasp.force_n(pull)
+        moments[arm] = grasp.moment_nm(pull, grasp.springs.rows @ positions_m)
+    energy_j, wrenches = 0.0, {}
+    for term in terms:
+        energy, gradient = term.energy_and_gradient(positions_m)
+        if isinstance(term, ElasticBody | MaterialTerm):
+            energy_j += energy
+        else:
+            wrenches[term.name] = Wrench.of(-gradient, positions_m)
+    stress_pa, stress_at_m = largest_principal_stress(terms, positions_m)
     return TissueState(
         nodes_m=positions_m.copy(),
         surface=surface.surface(positions_m),
-        grasp_forces_n=grasp_forces,
-        grasp_moments_nm=grasp_moments,
-        attachment_forces_n=net_force(forces[:holes]),
-        largest_principal_stress_pa=peak.largest_pa,
-        stress_at_m=peak.position_m,
-        strain_energy_j=energy.body.energy_and_gradient(positions_m)[0],
+        grasp_forces_n=forces,
+        grasp_moments_nm=moments,
+        attachment_forces_n=net_force(attachments.forces_n(positions_m)),
+        largest_principal_stress_pa=stress_pa,
+        stress_at_m=stress_at_m,
+        strain_energy_j=energy_j,
         converged=converged,
         iterations=iterations,
+        wrenches=wrenches,
     )
+
+
+def largest_principal_stress(terms: Iterable[Term], positions_m: Floats) -> tuple[float, Floats]:
+    """Largest principal Cauchy stress [Pa] of all material terms together, and where (3,) it acts.
+
+    Raises:
+        ValueError: none of ``terms`` is an elastic body.
+    """
+    terms = list(terms)
+    bodies = [term for term in terms if isinstance(term, ElasticBody)]
+    if not bodies:
+        raise ValueError("stress needs an elastic body among the terms")
+    points = bodies[0].points
+    F = points.deformation(positions_m)
+    P = bodies[0].stress_pa(F)
+    for term in terms:
+        if isinstance(term, MaterialTerm):
+            P = P + term.density_and_stress(F)[1]
+    largest, element, point = integration.largest_principal_stress(F, P)
+    corners = positions_m[points.mesh.connectivity[element]]
+    return largest, points.values[point] @ corners

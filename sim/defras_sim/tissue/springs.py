@@ -10,12 +10,15 @@ where the whole element has to follow: 8x8x1 elements then read 23 % too much fo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
 from defras_sim.geometry import Floats
-from defras_sim.tissue.mesh import Mesh
+from defras_sim.tissue.layout import Places, add_scalars
+from defras_sim.tissue.mesh import Integers, Mesh
+from defras_sim.tissue.terms import unknown_parameter
 
 # Seven-point rule of degree 5 for the mean over the unit disc (Radon 1948): the centre, and six
 # points on a circle.
@@ -53,13 +56,58 @@ class Springs:
         force = self.stiffness_n_per_m[:, None] * stretch
         return 0.5 * float(np.sum(force * stretch)), -(self.rows.T @ force)
 
-    def tangent(self) -> sparse.csc_array:
-        """Second derivative (3 nodes, 3 nodes) [N/m]: constant."""
+    @cached_property
+    def _coupling(self) -> sparse.coo_array:
+        """Second derivative by one coordinate (nodes, nodes) [N/m]; those of springs that act."""
         acting = self.stiffness_n_per_m > 0
         rows = self.rows[acting]
         scaled = rows.multiply(self.stiffness_n_per_m[acting, None])
-        scalar = sparse.csc_array(rows.T @ scaled)
-        return sparse.csc_array(sparse.kron(scalar, np.eye(3), format="csc"))
+        return sparse.coo_array(rows.T @ scaled)
+
+    @cached_property
+    def pairs(self) -> Integers:
+        """Nodes (m, 2) that the springs couple."""
+        return np.column_stack([self._coupling.row, self._coupling.col]).astype(np.int64)
+
+    @property
+    def pair_stiffness_n_per_m(self) -> Floats:
+        """Second derivative (m,) of each of :attr:`pairs`, the same along x, y and z."""
+        return self._coupling.data
+
+
+@dataclass(frozen=True)
+class SpringTerm:
+    """A boundary term: ``springs`` that pull what they hold to ``targets_m`` (r, 3).
+
+    Its parameter scales all stiffnesses alike.
+    """
+
+    name: str
+    springs: Springs
+    targets_m: Floats
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        return ("stiffness_scale",)
+
+    @property
+    def pairs(self) -> Integers:
+        return self.springs.pairs
+
+    def forces_n(self, positions_m: Floats) -> Floats:
+        """Generalised force (r, 3) of each spring on the tissue."""
+        return self.springs.forces(positions_m, self.targets_m)
+
+    def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
+        return self.springs.energy_and_gradient(positions_m, self.targets_m)
+
+    def add_tangent(self, positions_m: Floats, places: Places, entries: Floats) -> None:
+        add_scalars(self.springs.pair_stiffness_n_per_m, places, entries)
+
+    def gradient_by(self, parameter: str, positions_m: Floats) -> Floats:
+        if parameter not in self.parameters:
+            raise unknown_parameter(self, parameter)
+        return self.energy_and_gradient(positions_m)[1]
 
 
 def disc_rows(

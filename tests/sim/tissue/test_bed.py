@@ -4,6 +4,7 @@ import pytest
 from defras_sim.geometry import Pose
 from defras_sim.scene import Attachments, Roi, Scene, Tissue
 from defras_sim.tissue.bed import ONSET_M, Bed, bed_under
+from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.mesh import slab_mesh
 from defras_sim.tissue.model import TissueModel
 
@@ -17,7 +18,11 @@ def test_gradient_and_tangent_are_slopes_at_every_depth():
         _, slope = bed.energy_and_gradient(x)
         assert slope[0, 2] == pytest.approx((up - down) / 2e-9, abs=1e-6)
         expected = (up_slope - down_slope)[0, 2] / 2e-9
-        assert bed.tangent_diagonal(x)[2] == pytest.approx(expected, abs=1e-3)
+        tangent = PotentialEnergy(1, [bed]).tangent(x).toarray()
+        assert tangent[2, 2] == pytest.approx(expected, abs=1e-3)
+        raised = [Bed(h, np.full(1, 300.0)).energy_and_gradient(x)[1] for h in (1e-9, -1e-9)]
+        by_height = (raised[0] - raised[1]) / 2e-9
+        np.testing.assert_allclose(bed.gradient_by("height_m", x), by_height, atol=1e-3)
 
 
 def test_the_slab_rests_without_touching():

@@ -12,7 +12,7 @@ from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import slab_mesh
 from defras_sim.tissue.solver import NewtonSettings, NewtonSolver
-from defras_sim.tissue.springs import ROW_SHIFTS, Springs, disc_rows, joined
+from defras_sim.tissue.springs import ROW_SHIFTS, Springs, SpringTerm, disc_rows, joined
 
 E, NU = 3000.0, 0.45
 PRESCRIBED_N_PER_M = 1e7  # far above the stiffest mode of the mesh, 4e3 N/m
@@ -35,7 +35,8 @@ def lift_forces(body: ElasticBody, held: Springs, shifts, lifts_m) -> list[float
     positions, forces = x, []
     for lift in np.arange(0.0025, max(lifts_m) + 1e-9, 0.0025):
         targets = springs.rows @ x + shifts[:, None] * [0, 0, lift]
-        solution = solver.minimise(PotentialEnergy(body, springs, targets), positions)
+        energy = PotentialEnergy(len(x), [body, SpringTerm("held", springs, targets)])
+        solution = solver.minimise(energy, positions)
         assert solution.converged
         positions = solution.positions_m
         if np.isclose(lift, lifts_m).any():
@@ -121,7 +122,7 @@ def test_slender_cantilever_bends_as_beam_theory_says(material):
     load = 1e-6  # a spring a metre long, so soft that it is a dead load
     rows = sparse.csr_array(sparse.vstack([nodes[clamped], mean], format="csr"))
     springs = Springs(rows, np.concatenate([np.full(len(clamped), PRESCRIBED_N_PER_M), [load]]))
-    energy = PotentialEnergy(body, springs, targets)
+    energy = PotentialEnergy(len(x), [body, SpringTerm("held", springs, targets)])
     solution = NewtonSolver(NewtonSettings(residual_n=1e-10)).minimise(energy, x)
     assert solution.converged
     deflection = (mean @ solution.positions_m - mean @ x)[0, 2]
