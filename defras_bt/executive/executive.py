@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,14 +10,19 @@ import numpy as np
 import py_trees
 
 from defras_bt.acting.actions import action_leaves
+from defras_bt.executive.acting_leaves import ActionVisitor
 from defras_bt.executive.blackboard import Blackboard, TickInputs
 from defras_bt.executive.context import Context
-from defras_bt.executive.gate import CommandGate, GateVerdict
+from defras_bt.executive.deadline import Deadline
+from defras_bt.executive.gate import CommandGate, GateVerdict, Proposal
 from defras_bt.executive.loader import LoadedTree, load_tree
 from defras_bt.executive.perception import Perception
 from defras_bt.executive.statuses import TickedVisitor
 from defras_bt.recording.record import Event, Recorder, TickRecord
 from defras_sim.worlds.protocol import HOLD, Command, World
+
+# So long a tree may want motion that the gate refuses before a human is asked.
+REFUSED_PATIENCE_S = 5.0
 
 
 class ExecutiveFailed(RuntimeError):
@@ -38,6 +44,7 @@ class Executive:
         perception: Perception,
         recorder: Recorder,
         max_time_s: float,
+        deadline: Deadline = nullcontext,
     ) -> None:
         self._context = context
         self._board: Blackboard = context.board
@@ -45,16 +52,20 @@ class Executive:
         self._perception = perception
         self._recorder = recorder
         self._max_time_s = max_time_s
+        self._deadline = deadline
         self.tree: LoadedTree = load_tree(tree_file, context)
         self._board.metric = self.tree.metric
         self._bt = py_trees.trees.BehaviourTree(self.tree.root)
         self._ticked = TickedVisitor()
         self._bt.add_visitor(self._ticked)
+        self._actions = ActionVisitor()
+        self._bt.add_visitor(self._actions)
         self._gate = CommandGate(context.scene, self.tree.metric)
         self._tick = 0
         self._state_before = 0
         self._over_before = False
         self._stopped_before: tuple[str, ...] = ()
+        self._refused_since_s: float | None = None
         self._last: TickRecord | None = None
 
     def run(self) -> None:
@@ -63,6 +74,7 @@ class Executive:
         Raises:
             ExecutiveFailed: after any exception. Motion is zero, the grip is kept, and what
                 happened stands in the last record.
+            KeyboardInterrupt: the operator ended the program; the same holds.
         """
         try:
             while self._board.outcome is None:
@@ -71,6 +83,9 @@ class Executive:
             failure = ExecutiveFailed(f"{type(error).__name__}: {error}")
             self._stop_after(failure)
             raise failure from error
+        except BaseException as error:
+            self._stop_after(ExecutiveFailed(f"the program was ended ({type(error).__name__})"))
+            raise
 
     def _stop_after(self, failure: ExecutiveFailed) -> None:
         """Motion zero first; then the outcome, and a last record."""
@@ -81,18 +96,22 @@ class Executive:
             self._record_failure(f"The world did not take the order to stop ({error}): {failure}")
             raise failure from error
         self._board.end("error", str(failure))
-        self._record_failure(f"Motion stopped, the grip is kept: {failure}")
+        self._record_failure(
+            f"Motion stopped, the grip is kept, a human is asked to take over: {failure}"
+        )
 
     def _one_tick(self) -> None:
         board = self._board
         inputs = self._perception.update(self._tick, self._world.observe())
         board.begin_tick(inputs)
         self._tell_changes(inputs)
-        self._bt.tick()
+        with self._deadline():
+            self._bt.tick()
         if inputs.time_s >= self._max_time_s and board.outcome is None:
             board.tell("end", f"Stopped after {inputs.time_s:.0f} s without the goal.", "error")
             board.end("not_reached", f"time is over after {inputs.time_s:.0f} s")
-        verdict = self._gate.check(board.command, board.rate, inputs)
+        proposal = Proposal(board.command, board.rate, self._actions.acting, self._world.time_s)
+        verdict = self._gate.check(proposal, inputs)
         self._tell_stopped(verdict)
         sent = verdict.command if board.outcome is None else HOLD
         self._world.command(sent)
@@ -146,6 +165,18 @@ class Executive:
             sentence = f"The command gate stopped motion: {'; '.join(stopped)}."
             self._board.tell("hold", sentence, "warning")
         self._stopped_before = stopped
+        self._end_if_refused_for_long(stopped)
+
+    def _end_if_refused_for_long(self, stopped: tuple[str, ...]) -> None:
+        """A tree that goes on wanting what the gate refuses does not know what to do."""
+        now_s = self._board.inputs.time_s
+        if not stopped or self._refused_since_s is None:
+            self._refused_since_s = now_s if stopped else None
+        elif now_s - self._refused_since_s >= REFUSED_PATIENCE_S and self._board.outcome is None:
+            why = f"motion was refused for {REFUSED_PATIENCE_S:g} s: {'; '.join(stopped)}"
+            sentence = f"Motion stopped, a human is asked to take over: {why}."
+            self._board.tell("human", sentence, "error")
+            self._board.end("human", why)
 
     def _record(self, inputs: TickInputs, sent: Command) -> None:
         true_force_n, true_surface = self._world.true_force_n(), self._world.true_surface()

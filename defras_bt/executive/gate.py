@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from defras_bt.executive.blackboard import TickInputs
+from defras_bt.sensing.freshness import stale
+from defras_sim.arm.limits import ArmLimits
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
-from defras_sim.worlds.protocol import HOLD, ArmCommand, ArmObservation, Command, Observation
+from defras_sim.worlds.protocol import (
+    HOLD,
+    JAW_CLOSED_RAD,
+    JAW_OPEN_RAD,
+    ArmCommand,
+    ArmObservation,
+    Command,
+    Observation,
+)
 
 # Tips may not go deeper than the grasp depth plus this, nor farther out than the slab plus this.
 BELOW_SURFACE_M = 0.003
@@ -22,8 +33,23 @@ FORCE_PATIENCE_S = 1.0
 
 
 @dataclass(frozen=True)
+class Proposal:
+    """What the tree came to at a tick.
+
+    ``acting``: whether an action, a leaf of role "motion", was under way when the tick ended.
+    ``time_s``: world time when the tree returned; in a world that does not wait, later than that
+    of the inputs.
+    """
+
+    command: Command
+    rate: float
+    acting: bool
+    time_s: float
+
+
+@dataclass(frozen=True)
 class GateVerdict:
-    """What may be sent, and in words why it differs from what was proposed."""
+    """What may be sent, and in words why motion that was proposed is not in it."""
 
     command: Command
     reasons: tuple[str, ...]
@@ -32,38 +58,79 @@ class GateVerdict:
 class CommandGate:
     """Scales, clips or zeroes each command from the tick's inputs alone.
 
-    Motion of every arm is zero on any trip. Where force or shape trip, jaws may still move, so that
-    the tree can let go of tissue on the spot; where sensors, operator or the command itself do,
-    every jaw keeps its grip.
+    Motion of every arm is zero on any trip. Where force or shape trip, or nobody owns up to the
+    motion, jaws may still move, so that the tree can let go of tissue on the spot; where sensors,
+    operator, the time the tree took or the command itself do, every jaw keeps its grip. What is
+    left is slowed to the limits of speed, and cut off where the tip would leave the workspace or a
+    joint its limits.
     """
 
     def __init__(self, scene: Scene, metric: str | None) -> None:
-        self._motion = scene.motion
-        self._tick_s = scene.tick_s
+        self._scene = scene
         self._metric = metric
+        self._arms: Mapping[str, ArmLimits] = {
+            name: ArmLimits(np.array(arm.rcm_m)) for name, arm in scene.arms.items()
+        }
         half = np.array([scene.tissue.length_x_m, scene.tissue.width_y_m]) / 2 + BESIDE_TISSUE_M
         self._low_m = np.array([*-half, -BELOW_SURFACE_M])
         self._high_m = np.array([*half, ABOVE_TISSUE_M])
 
-    def check(self, proposed: Command, rate: float, inputs: TickInputs) -> GateVerdict:
+    def check(self, proposed: Proposal, inputs: TickInputs) -> GateVerdict:
         """The command that may leave."""
-        blind = [*_blindness(inputs), *_faults(proposed, rate, inputs.observation)]
-        tissue = self._tissue_trips(inputs)
+        blind = [
+            *_blindness(inputs),
+            *self._lateness(proposed.time_s, inputs),
+            *self._faults(proposed, inputs.observation),
+        ]
+        bound = [*self._tissue_trips(inputs), *_ownerless(proposed)]
         if blind:
-            return GateVerdict(HOLD, (*blind, *tissue))
-        if tissue:
-            jaws = {name: ArmCommand(jaw_rad=arm.jaw_rad) for name, arm in proposed.arms.items()}
-            return GateVerdict(Command(jaws), tuple(tissue))
+            return GateVerdict(HOLD, (*blind, *bound))
+        if bound:
+            jaws = {n: ArmCommand(jaw_rad=_jaw(arm)) for n, arm in proposed.command.arms.items()}
+            return GateVerdict(Command(jaws), tuple(bound))
+        rate = proposed.rate
         if inputs.force_n > inputs.force_threshold_n:
             rate = min(rate, RATE_OVER_FORCE)
         observed = inputs.observation.arms
         # A jaw that does not tell may hold tissue.
         holding = any(arm.grasped is not False for arm in observed.values())
-        arms = {
-            name: self._limited(command, rate, observed[name], holding)
-            for name, command in proposed.arms.items()
-        }
-        return GateVerdict(Command(arms), ())
+        motion = self._scene.motion
+        speed_m_s = motion.tissue_speed_m_s if holding else motion.reach_speed_m_s
+        arms, reasons = {}, []
+        for name, command in proposed.command.arms.items():
+            slowed = _slowed(command, speed_m_s, rate)
+            arms[name], stopped = self._in_reach(name, slowed, observed[name])
+            if stopped:
+                reasons.append(f"{name} is at its limits: {stopped}")
+        return GateVerdict(Command(arms), tuple(reasons))
+
+    def _lateness(self, time_s: float, inputs: TickInputs) -> list[str]:
+        """What the tree knew may have been fresh when it started, and too old when it returned."""
+        seen = inputs.observation
+        if time_s == seen.time_s:
+            return []
+        late_s = time_s - seen.time_s
+        if not late_s >= 0.0:
+            return [f"the tree returned at {time_s} s, before its inputs of {seen.time_s:.2f} s"]
+        aged = stale(replace(seen, time_s=time_s), self._scene)
+        return [f"the tree took {late_s:.2f} s: {sentence}" for sentence in aged.values()]
+
+    def _faults(self, proposed: Proposal, observation: Observation) -> list[str]:
+        """What is wrong with the command itself: one fault, and nothing of it is trusted."""
+        faults = []
+        if not 0.0 <= proposed.rate <= 1.0:
+            faults.append(f"rate {proposed.rate} is not between 0 and 1")
+        for name, command in proposed.command.arms.items():
+            observed = observation.arms.get(name)
+            if observed is None or name not in self._arms:
+                faults.append(f"{name} is not an arm of this set-up")
+            elif np.shape(command.linear_m_s) != (3,) or np.shape(command.angular_rad_s) != (3,):
+                faults.append(f"the command for {name} has not three components")
+            elif not command.is_finite:
+                faults.append(f"the command for {name} is not a number")
+            elif not np.all(np.isfinite(observed.setpoint_tissue_from_tip.position_m)):
+                faults.append(f"the set-point of {name} is not a number")
+        return faults
 
     def _tissue_trips(self, inputs: TickInputs) -> list[str]:
         """What speaks against moving tissue, but not against letting it go."""
@@ -83,23 +150,25 @@ class CommandGate:
                 reasons.append(f"the warning state is {reading.warning_state[self._metric]}")
         return reasons
 
-    def _limited(
-        self, command: ArmCommand, rate: float, observed: ArmObservation, holding: bool
-    ) -> ArmCommand:
-        limit = self._motion.tissue_speed_m_s if holding else self._motion.reach_speed_m_s
-        linear = _clipped(command.linear_m_s, limit) * rate
-        start = observed.setpoint_tissue_from_tip.position_m
+    def _in_reach(
+        self, name: str, command: ArmCommand, observed: ArmObservation
+    ) -> tuple[ArmCommand, str]:
+        """The part of a command that keeps workspace and joint limits; why nothing is left."""
+        tick_s, tip = self._scene.tick_s, observed.setpoint_tissue_from_tip
+        start = tip.position_m
         # Outside the workspace only motion back into it is let through.
         end = np.clip(
-            start + linear * self._tick_s,
+            start + command.linear_m_s * tick_s,
             np.minimum(start, self._low_m),
             np.maximum(start, self._high_m),
         )
-        return ArmCommand(
-            (end - start) / self._tick_s,
-            _clipped(command.angular_rad_s, TURNING_RAD_S) * rate,
-            command.jaw_rad,
-        )
+        linear_m, angular_rad = end - start, command.angular_rad_s * tick_s
+        if not (linear_m.any() or angular_rad.any()):
+            return ArmCommand(jaw_rad=command.jaw_rad), ""
+        allowed = self._arms[name].allowed(tip, linear_m, angular_rad, tick_s)
+        rate = allowed.share / tick_s
+        limited = ArmCommand(linear_m * rate, angular_rad * rate, command.jaw_rad)
+        return limited, "" if allowed.share > 0.0 else allowed.reason
 
 
 def _blindness(inputs: TickInputs) -> list[str]:
@@ -107,22 +176,36 @@ def _blindness(inputs: TickInputs) -> list[str]:
     return [stop for stop in (*inputs.missing, inputs.operator_stop) if stop]
 
 
-def _faults(proposed: Command, rate: float, observation: Observation) -> list[str]:
-    """What is wrong with the command itself: one fault, and nothing of it is trusted."""
-    faults = []
-    if not 0.0 <= rate <= 1.0:
-        faults.append(f"rate {rate} is not between 0 and 1")
-    for name, command in proposed.arms.items():
-        observed = observation.arms.get(name)
-        if observed is None:
-            faults.append(f"{name} is not an arm of this set-up")
-        elif not command.is_finite:
-            faults.append(f"the command for {name} is not a number")
-        elif not np.all(np.isfinite(observed.setpoint_tissue_from_tip.position_m)):
-            faults.append(f"the set-point of {name} is not a number")
-    return faults
+def _ownerless(proposed: Proposal) -> list[str]:
+    """Motion may only come from an action that goes on: not from one that a guard has ended."""
+    moving = any(
+        np.any(arm.linear_m_s) or np.any(arm.angular_rad_s)
+        for arm in proposed.command.arms.values()
+    )
+    if moving and not proposed.acting:
+        return ["motion was proposed, but no action was under way when the tick ended"]
+    return []
+
+
+def _slowed(command: ArmCommand, speed_m_s: float, rate: float) -> ArmCommand:
+    return ArmCommand(
+        _clipped(command.linear_m_s, speed_m_s) * rate,
+        _clipped(command.angular_rad_s, TURNING_RAD_S) * rate,
+        _jaw(command),
+    )
+
+
+def _jaw(command: ArmCommand) -> float | None:
+    if command.jaw_rad is None:
+        return None
+    return float(np.clip(command.jaw_rad, JAW_CLOSED_RAD, JAW_OPEN_RAD))
 
 
 def _clipped(vector: Floats, limit: float) -> Floats:
-    length = float(np.linalg.norm(vector))
-    return vector * (limit / length) if length > limit else vector
+    """``vector`` (3,) of at most ``limit``, even where its own square is too large a number."""
+    largest = float(np.abs(vector).max())
+    if largest == 0.0:
+        return vector
+    shape = vector / largest
+    length = float(np.linalg.norm(shape))
+    return vector if largest <= limit / length else shape * (limit / length)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 
+from defras_bt.executive.deadline import Deadline
 from defras_bt.executive.executive import Executive
 from defras_bt.executive.perception import Perception
 from defras_bt.recording.composite import CompositeRecorder
@@ -49,6 +51,7 @@ class Stage:
         *,
         max_time_s: float = 120.0,
         beside: Sequence[Recorder] = (),
+        deadline: Deadline = nullcontext,
     ) -> None:
         self.bench = bench if bench is not None else Bench()
         self.operator_stop: str | None = None
@@ -65,7 +68,7 @@ class Stage:
         )
         file = tree if isinstance(tree, Path) else resource(f"trees/{tree}.yaml")
         self.executive = Executive(
-            file, bench.context, bench.world, perception, self.recorder, max_time_s
+            file, bench.context, bench.world, perception, self.recorder, max_time_s, deadline
         )
 
     @property

@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from defras_bt.executive.blackboard import Blackboard
 from defras_bt.executive.executive import ExecutiveFailed
-from defras_bt.executive.node import Node
 from defras_bt.recording.record import RunInfo
 from defras_bt.recording.summary import SummaryRecorder, read_run_json
 from defras_bt.recording.versions import versions
-from defras_sim.worlds.protocol import HOLD, ArmCommand, Command
+from defras_sim.worlds.protocol import HOLD, Command
 from tests.executive.stage import Stage, leaves, moving, still
 from tests.nodes.bench import EPSILON_N, Bench
 from tests.nodes.bench_services import plan_of
@@ -272,74 +270,6 @@ class TestRecords:
         (sentence,) = stage.notes.told("warning")
         assert f"Warning state {state}" in sentence
         assert what in sentence
-
-
-class TestMisbehavingLeaves:
-    """The gate never trusts the tree."""
-
-    @pytest.mark.parametrize(
-        ("velocity", "reason"),
-        [
-            ([float("nan"), 0.0, 0.0], "the command for psm1 is not a number"),
-            ([0.0, float("inf"), 0.0], "the command for psm1 is not a number"),
-        ],
-    )
-    def test_a_leaf_that_commands_no_number(self, velocity, reason):
-        stage = with_leaf(lambda board: board.move("psm1", ArmCommand(np.array(velocity))))
-        records = stage.ticks(0.5)
-        assert all(record.sent == HOLD for record in records)
-        (sentence,) = stage.notes.told("hold")
-        assert reason in sentence
-
-    def test_a_leaf_that_races(self):
-        stage = with_leaf(lambda board: board.move("psm1", ArmCommand(np.array([9.0, 0.0, 0.0]))))
-        limit = stage.bench.scene.motion.reach_speed_m_s
-        assert moving(stage.tick())["psm1"] == pytest.approx(limit)
-        assert moving(stage.tick())["psm1"] <= limit + 1e-12
-
-    def test_a_leaf_that_commands_an_arm_that_is_not_there(self):
-        stage = with_leaf(lambda board: board.move("psm3", ArmCommand(np.ones(3) * 0.01)))
-        assert stage.tick().sent == HOLD
-        assert "psm3 is not an arm" in stage.notes.told("hold")[0]
-
-    def test_a_leaf_that_raises_the_rate(self):
-        def races(board):
-            board.rate = 2.0
-            board.move("psm1", ArmCommand(np.ones(3) * 0.01))
-
-        assert with_leaf(races).tick().sent == HOLD
-
-    def test_a_leaf_that_moves_in_spite_of_the_guards(self):
-        """It hands in its command behind the tree's back; the inputs alone decide."""
-        stage = with_leaf(lambda board: board.move("psm1", ArmCommand(np.ones(3) * 0.01)))
-        assert any(moving(stage.tick()).values())
-        stage.operator_stop = "stop"
-        assert still(stage.tick())
-        stage.operator_stop = None
-        assert any(moving(stage.tick()).values())
-        stage.bench.world.cloud_m = None
-        assert still(stage.tick())
-
-    def test_a_leaf_that_raises(self):
-        def raises(board):
-            raise ZeroDivisionError("by 0")
-
-        stage = with_leaf(raises)
-        assert "ZeroDivisionError: by 0" in str(run(stage))
-        assert stage.bench.world.sent == [HOLD]
-
-
-def with_leaf(act: Callable[[Blackboard], None]) -> Stage:
-    """A tree whose first leaf, a guard, does ``act`` every tick and lets nothing else be ticked."""
-    stage = Stage("fras")
-    leaf = next(node for node in stage.executive.tree.root.iterate() if isinstance(node, Node))
-
-    def update() -> Status:
-        act(stage.board)
-        return leaf.run("rogue", "does as it likes")
-
-    leaf.update = update
-    return stage
 
 
 class TestTwoExecutives:

@@ -119,6 +119,10 @@ class World(Protocol):
     name: str
     tick_s: float
 
+    @property
+    def time_s(self) -> float:
+        """World time now. A simulated world waits for its next step; a real one does not."""
+
     def observe(self) -> Observation:
         """The latest sensor readings; the same object twice if no time passed."""
 
