@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from clingo import Function, Number, Symbol, Tuple_
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from defras_bt.planning.plan import MANOEUVRES, GridPoint, Situation
 from defras_sim.scene import Scene
@@ -37,12 +38,11 @@ def attachment_distances_mm(scene: Scene, attached: NDArray[np.bool_]) -> dict[G
     held_xy_m = holes_xy_m[np.asarray(attached, dtype=bool)]
     if not len(held_xy_m):
         return {}
-    return {
-        point: round(
-            1000 * float(np.linalg.norm(held_xy_m - scene.grasp_xy_m(*point), axis=1).min())
-        )
-        for point in scene.grasp_points
-    }
+    points_xy_m = np.array([scene.grasp_xy_m(*point) for point in scene.grasp_points])
+    nearest_m = cKDTree(held_xy_m).query(points_xy_m)[0]
+    return dict(
+        zip(scene.grasp_points, np.rint(1000 * nearest_m).astype(int).tolist(), strict=True)
+    )
 
 
 def scene_facts(scene: Scene) -> str:

@@ -10,9 +10,12 @@ from pydantic import Field
 
 from defras_bt.acting.jaw import JAW_TOLERANCE_RAD
 from defras_bt.executive.node import Node, NodeParameters, Role
+from defras_bt.executive.reasons import Code, Remedy
+from defras_bt.executive.recovery import RecoveryLeaf
 from defras_bt.executive.registry import register_node
 from defras_bt.planning.plan import MANOEUVRES, ArmSituation, GridPoint, Plan, Situation
 from defras_bt.planning.planner import NoPlan
+from defras_bt.planning.program import PlanningTimeout
 from defras_sim.retraction import SEQUENCES
 from defras_sim.worlds.protocol import JAW_OPEN_RAD
 
@@ -27,33 +30,35 @@ class ReplanParameters(NodeParameters):
     rehearse: Annotated[int, Field(ge=0)] = 0
 
 
-class PlanSource(Node):
+class PlanSource(RecoveryLeaf):
     """Base of the leaves that bring plans."""
 
-    role: ClassVar[Role] = "recovery"
+    remedy: ClassVar[Remedy] = Remedy.REPLAN
 
     def adopt(self, plan: Plan, why: str) -> Status:
         """Put ``plan`` in place for the coming ticks, if the operator approves it."""
         board = self.context.board
         if not self.context.approve(plan):
             board.operator_refused = "the operator did not approve the plan"
-            return self.fail("not_approved", board.operator_refused)
+            return self.fail(Code.PLAN_REFUSED, board.operator_refused)
         board.new_plan = plan
         board.plan_belief = self.context.scene.attached
         board.tell("plan", why, data={"actions": [str(action) for action in plan.actions]})
-        return self.succeed("planned", why)
+        return self.succeed(Code.PLANNED, why)
 
 
 @register_node
 class UsePreoperativePlan(PlanSource):
     """Bring the plan made before the operation, once, at the start."""
 
-    def update(self) -> Status:
+    def recover(self) -> Status:
         board, plan = self.context.board, self.context.preoperative
         if plan is None:
-            return self.fail("none", "there is no plan from before the operation")
+            return self.fail(Code.NOTHING_PREPARED, "there is no plan from before the operation")
         if board.preoperative_used:
-            return self.fail("used", "the plan from before the operation was used already")
+            return self.fail(
+                Code.USED_ALREADY, "the plan from before the operation was used already"
+            )
         board.preoperative_used = True
         board.plan_exposing = tuple(a.name for a in plan.actions if a.name in MANOEUVRES)
         steps = len(plan.actions)
@@ -67,7 +72,7 @@ class Replan(PlanSource):
     Parameters = ReplanParameters
     parameters: ReplanParameters
 
-    def update(self) -> Status:
+    def recover(self) -> Status:
         board = self.context.board
         first = board.plan is None and not board.preoperative_used
         self._block_exhausted()
@@ -75,7 +80,9 @@ class Replan(PlanSource):
             plan = self._rehearsed() if self.parameters.rehearse else self._plan(frozenset())
         except NoPlan as error:
             board.no_plan = str(error)
-            return self.fail("no_plan", str(error))
+            return self.fail(Code.IMPOSSIBLE, str(error))
+        except PlanningTimeout as error:
+            return self.fail(Code.PLANNER_TIMED_OUT, f"the planner gave up: {error}")
         if not first:
             board.tell(
                 "replan", f"Planned anew from what is true now: {len(plan.actions)} actions."
@@ -185,9 +192,9 @@ class PlanFitsBelief(Node):
     def update(self) -> Status:
         made_with = self.context.board.plan_belief
         if made_with is None:
-            return self.fail("no_plan", "there is no plan yet")
+            return self.fail(Code.NO_PLAN, "there is no plan yet")
         if not np.array_equal(made_with, self.context.scene.attached):
             return self.fail(
-                "outdated", "other attachments are believed than the plan was made with"
+                Code.OUTDATED, "other attachments are believed than the plan was made with"
             )
-        return self.succeed("fits", "the plan was made with what is believed now")
+        return self.succeed(Code.FITS, "the plan was made with what is believed now")

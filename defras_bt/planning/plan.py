@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 GridPoint = tuple[int, int]
 """(column, row) of a grasp point, both from 1 at the smallest x and y."""
 
+ACTIONS = ("reach", "open", "grasp", "pull", "move", "fold", "release")
+
 MANOEUVRES = ("pull", "move", "fold")
 """Motions of held tissue, in the order in which a retraction does them."""
 

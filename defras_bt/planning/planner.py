@@ -23,13 +23,13 @@ from defras_bt.planning.facts import (
     scene_facts,
     world_atoms,
 )
-from defras_bt.planning.plan import Action, GridPoint, Plan, Situation
+from defras_bt.planning.plan import ACTIONS, Action, GridPoint, Plan, Situation
 from defras_bt.planning.program import PROGRAMS, Answer, RetractionProgram
 from defras_sim.resources import resource
 from defras_sim.scene import Scene
 
-# Both arms let go, one reaches, opens, grasps, pulls, moves and folds: 8. The rest is reserve.
-MAX_HORIZON = 12
+# Both arms let go, one reaches, opens, grasps, pulls, moves and folds.
+MAX_HORIZON = 8
 
 
 class NoPlan(Exception):
@@ -45,9 +45,9 @@ class NoPlan(Exception):
 class Planner:
     """Plans for one scene. One clingo control lives as long as the planner does.
 
-    Horizons ascend from 0. Each one refuted proves that no plan is that short; at the first one
-    that is not, asp/grasp_choice.lp says which of the shortest plans is best. The best is unique,
-    so the answer does not depend on what was asked before.
+    One optimisation finds the best plan and proves it: fewest actions first, then what
+    asp/grasp_choice.lp prefers. The best is unique, so the answer does not depend on what was
+    asked before.
 
     Args:
         scene: arms, grasp points and region of interest; its attachments are not used.
@@ -68,7 +68,7 @@ class Planner:
         self.max_horizon = max_horizon
         self.budget_s = budget_s
         files = [resource(name) for name in PROGRAMS] if programs is None else list(programs)
-        self._program = RetractionProgram(scene_facts(scene), files)
+        self._program = RetractionProgram(scene_facts(scene), files, max_horizon)
         self._roi_mm = roi_distances_mm(scene)
 
     def plan(
@@ -98,38 +98,43 @@ class Planner:
         attachment_mm = attachment_distances_mm(self.scene, attached)
         self._program.set_world(world)
         self._program.set_belief(belief_facts(attachment_mm))
-        for horizon in range(self.max_horizon + 1):
-            answer = self._program.best(horizon, self.budget_s)
-            if answer is not None:
-                return self._plan_from(answer, attachment_mm)
-        raise NoPlan(self.max_horizon, self._obstacles(world, required_grasp))
+        answer = self._program.best(self.budget_s)
+        if answer is None:
+            raise NoPlan(self.max_horizon, self._obstacles(world, required_grasp))
+        return self._plan_from(answer, situation, attachment_mm)
 
-    def _plan_from(self, answer: Answer, attachment_mm: dict[GridPoint, int]) -> Plan:
+    def _plan_from(
+        self, answer: Answer, situation: Situation, attachment_mm: dict[GridPoint, int]
+    ) -> Plan:
+        shown = answer.by_name()
+        target = point_of(shown["final_grasp"][0].arguments[0])
         why = {
-            atom.arguments[2].number: atom.arguments[1].name
-            for atom in answer.shown
-            if atom.name == "because"
+            atom.arguments[2].number: atom.arguments[1].name for atom in shown.get("because", [])
         }
-        steps = [atom for atom in answer.shown if atom.name != "because"]
-        steps.sort(key=lambda atom: atom.arguments[3].number)
+        steps = [atom for name, atoms in shown.items() if name in ACTIONS for atom in atoms]
+        actions = tuple(
+            sorted((_action(step, situation, target) for step in steps), key=lambda a: a.time)
+        )
         return Plan(
-            actions=tuple(_action_from(step) for step in steps),
+            actions=actions,
             cost=answer.cost,
             proved_shortest=True,
             reasons=tuple(
-                self._reason(why[step.arguments[3].number], step, attachment_mm) for step in steps
+                self._reason(why[action.time], action, attachment_mm) for action in actions
             ),
         )
 
-    def _reason(self, reason: str, step: Symbol, attachment_mm: dict[GridPoint, int]) -> str:
-        point = point_of(step.arguments[2])
-        return reason_sentence(reason, point, self._roi_mm[point], attachment_mm.get(point))
+    def _reason(self, why: str, action: Action, attachment_mm: dict[GridPoint, int]) -> str:
+        point = action.point
+        if point is None:
+            raise RuntimeError(f"asp/retraction.lp shows {action} without a grasp point")
+        return reason_sentence(why, point, self._roi_mm[point], attachment_mm.get(point))
 
     def _obstacles(self, world: set[Symbol], required: GridPoint | None) -> list[str]:
         removable = sorted(world)
-        core = self._program.conflict(self.max_horizon, removable, self.budget_s)
+        core = self._program.conflict(removable, self.budget_s)
         if core is None:
-            raise RuntimeError("a plan exists that the ascending search did not find")
+            raise RuntimeError("a plan exists that the optimisation did not find")
         sentences = list(obstacle_sentences(core, len(self.scene.grasp_points)))
         if required is not None and not self.scene.arms_at(*required):
             sentences.append(
@@ -139,6 +144,7 @@ class Planner:
         return sentences
 
 
-def _action_from(atom: Symbol) -> Action:
-    tool, _, point, time = atom.arguments
-    return Action(name=atom.name, arm=tool.name, point=point_of(point), time=time.number)
+def _action(atom: Symbol, situation: Situation, target: GridPoint) -> Action:
+    tool, _, place, time = atom.arguments
+    point = target if place.name == "target" else situation.arms[tool.name].holding
+    return Action(name=atom.name, arm=tool.name, point=point, time=time.number)

@@ -28,18 +28,27 @@ class Answer:
     shown: tuple[Symbol, ...]
     cost: tuple[int, ...]
 
+    def by_name(self) -> dict[str, list[Symbol]]:
+        """The shown atoms by their predicate."""
+        found: dict[str, list[Symbol]] = {}
+        for atom in self.shown:
+            found.setdefault(atom.name, []).append(atom)
+        return found
+
 
 class RetractionProgram:
-    """One clingo control: the world is switched with externals, steps are added as needed."""
+    """One clingo control, grounded once for plans of at most ``horizon`` actions.
 
-    def __init__(self, facts: str, files: Iterable[Path]) -> None:
+    Between solves the world is switched with externals, and the belief is exchanged.
+    """
+
+    def __init__(self, facts: str, files: Iterable[Path], horizon: int) -> None:
         self._control = Control(["--warn=none"])
         for file in files:
             self._control.load(str(file))
         self._control.add("base", [], facts)
-        self._control.ground([("base", [])])
-        self._ground_check(0)
-        self._steps = 0
+        steps = [("step", [Number(step)]) for step in range(1, horizon + 1)]
+        self._control.ground([("base", []), *steps, ("goal", [Number(horizon)])])
         self._world: frozenset[Symbol] = frozenset()
         self._belief: tuple[int, str] | None = None
         self._beliefs = 0
@@ -70,9 +79,12 @@ class RetractionProgram:
         self._control.assign_external(_numbered("current", self._beliefs), True)
         self._belief = (self._beliefs, facts)
 
-    def best(self, horizon: int, budget_s: float) -> Answer | None:
-        """The optimal plan of exactly ``horizon`` actions; None proves that there is none."""
-        self._aim(horizon)
+    def best(self, budget_s: float) -> Answer | None:
+        """The optimal plan; None proves that there is none.
+
+        Raises:
+            PlanningTimeout: neither was proved within ``budget_s``.
+        """
         answers: list[Answer] = []
 
         def keep(model: Model) -> None:
@@ -83,24 +95,19 @@ class RetractionProgram:
         with self._control.solve(on_model=keep, async_=True) as handle:
             if not handle.wait(budget_s):
                 handle.cancel()
-                raise PlanningTimeout(f"no answer within {budget_s:g} s at {horizon} actions")
+                raise PlanningTimeout(f"no best plan within {budget_s:g} s")
             result = handle.get()
         if not result.exhausted:
-            raise RuntimeError(f"clingo stopped before it had searched all {horizon}-action plans")
+            raise RuntimeError("clingo stopped before it had searched all plans")
         return answers[0] if result.satisfiable else None
 
-    def conflict(
-        self, horizon: int, removable: Sequence[Symbol], budget_s: float
-    ) -> tuple[Symbol, ...] | None:
-        """Facts out of ``removable`` that together rule out a plan of at most ``horizon`` actions.
+    def conflict(self, removable: Sequence[Symbol], budget_s: float) -> tuple[Symbol, ...] | None:
+        """Facts out of ``removable`` that together rule out every plan.
 
         None if they do not. Only true external atoms can be removable; the others stay as they
         are. No fact can be dropped from the answer, except where trying would have taken more than
         ``MAX_DELETIONS`` solves or one of them more than ``budget_s``.
         """
-        self._aim(horizon)
-        for step in range(1, horizon + 1):  # steps may be left out, so that shorter plans count
-            self._control.assign_external(_numbered("active", step), None)
         for atom in removable:
             self._control.assign_external(atom, None)
         try:
@@ -140,20 +147,6 @@ class RetractionProgram:
             if handle.get().satisfiable:
                 return None
             return tuple(by_literal[literal] for literal in handle.core() if literal in by_literal)
-
-    def _aim(self, horizon: int) -> None:
-        """Ask for the goal after ``horizon`` steps, with only these steps switched on."""
-        while self._steps < horizon:
-            self._steps += 1
-            self._control.ground([("step", [Number(self._steps)])])
-            self._ground_check(self._steps)
-        for step in range(self._steps + 1):
-            self._control.assign_external(_numbered("query", step), step == horizon)
-            if step:
-                self._control.assign_external(_numbered("active", step), step <= horizon)
-
-    def _ground_check(self, step: int) -> None:
-        self._control.ground([("check", [Number(step)])])
 
 
 def _numbered(name: str, number: int) -> Symbol:

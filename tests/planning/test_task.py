@@ -27,8 +27,10 @@ def one_step(scene, psm1, psm2, *, target, blocked=(), do=None):
     situation = Situation({"psm1": psm1, "psm2": psm2}, frozenset(blocked))
     for atom in world_atoms(situation, ("pull", "fold"), target):
         control.assign_external(atom, True)
-    control.assign_external(Function("active", [Number(1)]), do is not None)
-    assumed = [] if do is None else [(parse_term(f"do({do},1)"), True)]
+    used = Function("used", [Number(1)])
+    assumed = [(used, do is not None)]
+    if do is not None:
+        assumed.append((parse_term(f"do({do},1)"), True))
     with control.solve(yield_=True, assumptions=assumed) as handle:
         model = handle.model()
         return None if model is None else {str(atom) for atom in model.symbols(atoms=True)}
@@ -36,13 +38,13 @@ def one_step(scene, psm1, psm2, *, target, blocked=(), do=None):
 
 POSSIBLE = [
     # action, psm1, psm2, target, blocked
-    ("reach(psm1,(2,5))", FREE, FREE, (2, 5), []),
-    ("reach(psm2,(2,1))", FREE, FREE, (2, 1), []),
-    ("reach(psm1,(2,3))", FREE, FREE, (2, 3), []),  # on the plane: both
-    ("reach(psm2,(2,3))", FREE, FREE, (2, 3), []),
-    ("reach(psm1,(2,5))", FREE, FREE, (2, 5), [(1, 5)]),
-    ("reach(psm1,(3,5))", AT, FREE, (3, 5), []),
-    ("reach(psm1,(2,5))", FREE, ArmSituation(at=(2, 1)), (2, 5), []),
+    ("reach(psm1)", FREE, FREE, (2, 5), []),
+    ("reach(psm2)", FREE, FREE, (2, 1), []),
+    ("reach(psm1)", FREE, FREE, (2, 3), []),  # on the plane: both
+    ("reach(psm2)", FREE, FREE, (2, 3), []),
+    ("reach(psm1)", FREE, FREE, (2, 5), [(1, 5)]),
+    ("reach(psm1)", AT, FREE, (3, 5), []),
+    ("reach(psm1)", FREE, ArmSituation(at=(2, 1)), (2, 5), []),
     ("open(psm1)", AT, FREE, (2, 5), []),
     ("grasp(psm1)", READY, FREE, (2, 5), []),
     ("pull(psm1)", HELD, FREE, (2, 5), []),
@@ -55,13 +57,12 @@ POSSIBLE = [
 ]
 
 IMPOSSIBLE = [
-    ("reach(psm2,(2,5))", FREE, FREE, (2, 5), []),  # the other arm's side
-    ("reach(psm1,(2,1))", FREE, FREE, (2, 1), []),
-    ("reach(psm1,(2,5))", FREE, FREE, (2, 5), [(2, 5)]),  # blocked
-    ("reach(psm1,(3,5))", HELD, FREE, (3, 5), []),  # jaw full
-    ("reach(psm1,(2,5))", AT, FREE, (2, 5), []),  # there already
-    ("reach(psm1,(2,5))", FREE, FREE, (3, 5), []),  # a detour
-    ("reach(psm1,(2,3))", FREE, ArmSituation(at=(2, 3)), (2, 3), []),  # the other arm is there
+    ("reach(psm2)", FREE, FREE, (2, 5), []),  # the other arm's side
+    ("reach(psm1)", FREE, FREE, (2, 1), []),
+    ("reach(psm1)", FREE, FREE, (2, 5), [(2, 5)]),  # blocked
+    ("reach(psm1)", HELD, FREE, (3, 5), []),  # jaw full
+    ("reach(psm1)", AT, FREE, (2, 5), []),  # there already
+    ("reach(psm1)", FREE, ArmSituation(at=(2, 3)), (2, 3), []),  # the other arm is there
     ("open(psm1)", FREE, FREE, (2, 5), []),  # nowhere
     ("open(psm1)", READY, FREE, (2, 5), []),  # open already
     ("open(psm1)", HELD, FREE, (2, 5), []),  # only release opens a full jaw
@@ -109,24 +110,24 @@ def test_impossible(scene, action, psm1, psm2, target, blocked):
 )
 def test_no_reaching_close_to_where_the_other_arm_holds(crowded, psm2, clear):
     atoms = one_step(crowded, FREE, psm2, target=(2, 3))
-    assert ("possible(reach(psm1,(2,3)),1)" in atoms) == clear
+    assert ("possible(reach(psm1),1)" in atoms) == clear
 
 
 EFFECTS = [
     # action, psm1, target, true afterwards, false afterwards
-    ("reach(psm1,(3,5))", AT, (3, 5), ["at(psm1,(3,5),1)"], ["at(psm1,(2,5),1)"]),
-    ("reach(psm1,(3,5))", READY, (3, 5), ["jaw_open(psm1,1)"], ["holding(psm1,(3,5),1)"]),
-    ("open(psm1)", AT, (2, 5), ["jaw_open(psm1,1)", "at(psm1,(2,5),1)"], ["holds_tissue(psm1,1)"]),
-    ("grasp(psm1)", READY, (2, 5), ["holding(psm1,(2,5),1)"], ["jaw_open(psm1,1)"]),
+    ("reach(psm1)", AT, (3, 5), ["at(psm1,target,1)"], ["at(psm1,elsewhere,1)"]),
+    ("reach(psm1)", READY, (3, 5), ["jaw_open(psm1,1)"], ["holding(psm1,target,1)"]),
+    ("open(psm1)", AT, (2, 5), ["jaw_open(psm1,1)", "at(psm1,target,1)"], ["holds_tissue(psm1,1)"]),
+    ("grasp(psm1)", READY, (2, 5), ["holding(psm1,target,1)"], ["jaw_open(psm1,1)"]),
     ("pull(psm1)", HELD, (2, 5), ["done(psm1,pull,1)"], ["done(psm1,fold,1)"]),
     ("move(psm1)", PULLED, (2, 5), ["done(psm1,move,1)", "done(psm1,pull,1)"], []),
-    ("fold(psm1)", PULLED, (2, 5), ["done(psm1,fold,1)", "holding(psm1,(2,5),1)"], []),
+    ("fold(psm1)", PULLED, (2, 5), ["done(psm1,fold,1)", "holding(psm1,target,1)"], []),
     (
         "release(psm1)",
         PULLED,
         (2, 5),
         ["jaw_open(psm1,1)"],
-        ["holding(psm1,(2,5),1)", "done(psm1,pull,1)", "at(psm1,(2,5),1)"],
+        ["holding(psm1,target,1)", "done(psm1,pull,1)", "at(psm1,target,1)"],
     ),
 ]
 
@@ -136,7 +137,7 @@ def test_effect(scene, action, psm1, target, true, false):
     atoms = one_step(scene, psm1, ArmSituation(at=(2, 1)), target=target, do=action)
     assert set(true) <= atoms
     assert not set(false) & atoms
-    assert "at(psm2,(2,1),1)" in atoms, "the other arm stays where it is"
+    assert "at(psm2,elsewhere,1)" in atoms, "the other arm stays where it is"
 
 
 def test_exactly_one_action_a_step(scene):
