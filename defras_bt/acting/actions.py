@@ -27,8 +27,13 @@ def action_leaves(plan: Plan, context: Context) -> list[ArmAction]:
     return [_leaf(step, action, context) for step, action in enumerate(plan.actions, 1)]
 
 
+def leaf_name(step: int, action: str, arm: str) -> str:
+    """What the leaf of the ``step``-th action (from 1) of a plan is called."""
+    return f"{step}_{action}_{arm}"
+
+
 def _leaf(step: int, action: Action, context: Context) -> ArmAction:
     if action.name not in LEAVES:
         raise ValueError(f"no leaf carries out {action.name!r}; there are: {', '.join(LEAVES)}")
     parameters = ActionParameters.model_validate({"arm": action.arm, "point": action.point})
-    return LEAVES[action.name](f"{step}_{action.name}_{action.arm}", context, parameters)
+    return LEAVES[action.name](leaf_name(step, action.name, action.arm), context, parameters)
