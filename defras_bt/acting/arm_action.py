@@ -8,6 +8,7 @@ import numpy as np
 from py_trees.common import Status
 
 from defras_bt.executive.node import Node, NodeParameters, Role
+from defras_bt.executive.reasons import Code
 from defras_bt.planning.plan import GridPoint
 from defras_sim.geometry import Floats
 from defras_sim.scene import ArmName
@@ -73,4 +74,4 @@ class ArmAction(Node):
         """Report success; the event told here is what counts as one action."""
         board = self.context.board
         board.tell("action", message, data={"action": self.spoken, "arm": self.arm})
-        return self.succeed("done", message)
+        return self.succeed(Code.DONE, message)

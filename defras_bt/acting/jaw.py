@@ -5,6 +5,7 @@ from __future__ import annotations
 from py_trees.common import Status
 
 from defras_bt.acting.arm_action import ArmAction
+from defras_bt.executive.reasons import Code
 from defras_bt.executive.registry import register_node
 from defras_sim.worlds.protocol import JAW_CLOSED_RAD, JAW_OPEN_RAD, ArmCommand
 
@@ -23,7 +24,7 @@ class JawAction(ArmAction):
             return None
         jaw_rad = self.observed.jaw_rad
         return self.fail(
-            "time_out",
+            Code.JAW_STUCK,
             f"{self.who}'s jaw should be {wanted} after {JAW_TIME_OUT_S:g} s "
             f"but stands at {jaw_rad:.2f} rad",
         )
@@ -41,11 +42,11 @@ class Open(JawAction):
 
     def update(self) -> Status:
         if self.arm in self.context.board.grips:
-            return self.fail("holding", f"{self.who} holds tissue: opening would drop it")
+            return self.fail(Code.HOLDING, f"{self.who} holds tissue: opening would drop it")
         self.drive(JAW_OPEN_RAD)
         if self.is_open:
             return self.finish(f"{self.who} has opened its jaw.")
-        return self.timed_out("open") or self.run("opening", f"{self.who} opens its jaw")
+        return self.timed_out("open") or self.run(Code.OPENING, f"{self.who} opens its jaw")
 
 
 @register_node
@@ -57,7 +58,7 @@ class Grasp(JawAction):
     def update(self) -> Status:
         board = self.context.board
         if board.at.get(self.arm) != self.point:
-            return self.fail("not_there", f"{self.who} is not at grasp point {self.point}")
+            return self.fail(Code.NOT_THERE, f"{self.who} is not at grasp point {self.point}")
         self.drive(JAW_CLOSED_RAD)
         if self.arm in board.grips:
             return self.finish(f"{self.who} has grasped the tissue at {self.point}.")
@@ -65,8 +66,8 @@ class Grasp(JawAction):
         if closed or self.elapsed_s > JAW_TIME_OUT_S:
             board.blocked.add(self.point)
             why = f"{self.who} closed its jaw at {self.point} without getting hold of the tissue"
-            return self.fail("nothing_grasped", why)
-        return self.run("closing", f"{self.who} closes its jaw")
+            return self.fail(Code.NOTHING_GRASPED, why)
+        return self.run(Code.CLOSING, f"{self.who} closes its jaw")
 
 
 @register_node
@@ -79,4 +80,4 @@ class Release(JawAction):
         self.drive(JAW_OPEN_RAD)
         if self.is_open and self.arm not in self.context.board.grips:
             return self.finish(f"{self.who} has released the tissue.")
-        return self.timed_out("open") or self.run("opening", f"{self.who} releases the tissue")
+        return self.timed_out("open") or self.run(Code.OPENING, f"{self.who} releases the tissue")

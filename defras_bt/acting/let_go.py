@@ -9,6 +9,8 @@ from pydantic import Field
 
 from defras_bt.acting.jaw import JAW_TIME_OUT_S
 from defras_bt.executive.node import Node, NodeParameters, Role
+from defras_bt.executive.reasons import Code, Remedy
+from defras_bt.executive.recovery import RecoveryLeaf
 from defras_bt.executive.registry import register_node
 from defras_sim.worlds.protocol import JAW_OPEN_RAD, ArmCommand
 
@@ -30,18 +32,18 @@ class GripUnsafe(Node):
     def update(self) -> Status:
         board = self.context.board
         if not board.grips:
-            return self.fail("nothing_held", "no arm holds tissue")
+            return self.fail(Code.NOTHING_HELD, "no arm holds tissue")
         over_s = board.force_over_s
         if over_s >= self.parameters.patience_s:
             return self.succeed(
-                "force", f"the force has been too high or unknown for {over_s:.2f} s"
+                Code.FORCE, f"the force has been too high or unknown for {over_s:.2f} s"
             )
         state = board.warning_state
         if state is not None and state >= 2 and (board.unexplained or self._learned_in_vain()):
             return self.succeed(
-                "unexplained", f"warning state {state}, and the attachments do not explain it"
+                Code.UNEXPLAINED, f"warning state {state}, and the attachments do not explain it"
             )
-        return self.fail("safe", "the grip is safe")
+        return self.fail(Code.SAFE, "the grip is safe")
 
     def _learned_in_vain(self) -> bool:
         """Learning stopped for just this and was believed, and the mismatch came back at once."""
@@ -51,21 +53,21 @@ class GripUnsafe(Node):
 
 
 @register_node
-class LetGo(Node):
+class LetGo(RecoveryLeaf):
     """Open the jaws that hold tissue, without moving a tip, and block their grasp points.
 
     A jaw that does not open ends the run with a call for a human.
     """
 
-    role: ClassVar[Role] = "recovery"
+    remedy: ClassVar[Remedy] = Remedy.LET_GO
 
     def initialise(self) -> None:
         self._started_s = self.context.board.inputs.time_s
 
-    def update(self) -> Status:
+    def recover(self) -> Status:
         board = self.context.board
         if not board.grips:
-            return self.succeed("let_go", "no arm holds tissue any more")
+            return self.succeed(Code.LET_GO, "no arm holds tissue any more")
         for arm, grip in board.grips.items():
             if grip.point not in board.blocked:
                 board.blocked.add(grip.point)
@@ -78,7 +80,7 @@ class LetGo(Node):
             board.move(arm, ArmCommand(jaw_rad=JAW_OPEN_RAD))
         if board.inputs.time_s - self._started_s > JAW_TIME_OUT_S:
             return self._stuck()
-        return self.run("opening", "letting go of the tissue")
+        return self.run(Code.OPENING, "letting go of the tissue")
 
     def _stuck(self) -> Status:
         """Tissue that must be let go and cannot be: only a human can help."""
@@ -87,4 +89,4 @@ class LetGo(Node):
         why = f"{arms} should let go of the tissue but did not open within {JAW_TIME_OUT_S:g} s"
         board.tell("human", f"Motion stopped, a human is asked to take over: {why}.", "error")
         board.end("human", why)
-        return self.fail("time_out", why)
+        return self.fail(Code.JAW_STUCK, why)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from py_trees.common import Status
 
 from defras_bt.acting.arm_action import ArmAction
+from defras_bt.executive.reasons import Code
 from defras_bt.executive.registry import register_node
 from defras_sim.motion import manoeuvre_target_m
 
@@ -23,17 +24,19 @@ class Manoeuvre(ArmAction):
         board = self.context.board
         grip = board.grips.get(self.arm)
         if grip is None or grip.point != self.point:
-            return self.fail("not_holding", f"{self.who} does not hold the tissue at {self.point}")
+            return self.fail(
+                Code.NOT_HOLDING, f"{self.who} does not hold the tissue at {self.point}"
+            )
         start_m = grip.starts_m.setdefault(self.spoken, self.setpoint_m.copy())
         target_m = manoeuvre_target_m(self.context.scene, self.spoken, start_m)
         if not self.go(target_m, self.context.scene.motion.tissue_speed_m_s):
             self._arrived_s = None
-            return self.run("moving", f"{self.who}: {self.spoken}, tissue held at {self.point}")
+            return self.run(Code.MOVING, f"{self.who}: {self.spoken}, tissue held at {self.point}")
         now_s = board.inputs.time_s
         if self._arrived_s is None:
             self._arrived_s = now_s
         if now_s - self._arrived_s < SETTLE_S:
-            return self.run("settling", f"{self.who} waits for the tissue to settle")
+            return self.run(Code.SETTLING, f"{self.who} waits for the tissue to settle")
         grip.done = (*grip.done, self.spoken)
         return self.finish(f"{self.who} has finished: {self.spoken}.")
 

@@ -6,6 +6,7 @@ import numpy as np
 from py_trees.common import Status
 
 from defras_bt.acting.arm_action import ARRIVED_M, ArmAction
+from defras_bt.executive.reasons import Code
 from defras_bt.executive.registry import register_node
 from defras_sim.geometry import Floats
 
@@ -19,7 +20,7 @@ class Reach(ArmAction):
     def update(self) -> Status:
         board, scene = self.context.board, self.context.scene
         if self.arm in board.grips:
-            return self.fail("holding", f"{self.who} holds tissue and cannot reach elsewhere")
+            return self.fail(Code.HOLDING, f"{self.who} holds tissue and cannot reach elsewhere")
         speed = scene.motion.reach_speed_m_s
         goal_m = np.array([*scene.grasp_xy_m(*self.point), 0.0])
         board.at.pop(self.arm, None)
@@ -28,7 +29,7 @@ class Reach(ArmAction):
         ):
             board.at[self.arm] = self.point
             return self.finish(f"{self.who} has reached grasp point {self.point}.")
-        return self.run("moving", f"{self.who} is on its way to grasp point {self.point}")
+        return self.run(Code.MOVING, f"{self.who} is on its way to grasp point {self.point}")
 
     def _waypoint_m(self, goal_m: Floats) -> Floats:
         tip_m = self.setpoint_m

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import GridPoint, Plan
-from defras_bt.recording.record import Event, Level
+from defras_bt.recording.record import Cause, Event, Level
 from defras_sim.geometry import Floats, Pose
 from defras_sim.tissue.state import TissueState
 from defras_sim.worlds.protocol import ArmCommand, Command, Observation
@@ -68,7 +68,9 @@ class Blackboard:
     ``metric`` names the discrepancy whose warning state counts; None for a tree without monitoring.
     ``command`` and ``rate`` start every tick at hold and 1: a rate is always taken from its
     nominal value, never from the tick before. ``force_over_s`` is how long the force has been over
-    its threshold or unknown without a break. ``unexplained``: learning last failed.
+    its threshold or unknown without a break. ``unexplained``: learning last failed. ``failure`` is
+    what recoveries of this tick have to mend: why the plan was not carried on, or what the last
+    recovery could not do.
     ``plan_belief`` (holes,) marks the attachments that the plan was made with; ``plan_exposing``
     lists the manoeuvres after which it counts on seeing the region. ``new_plan`` waits for the
     executive to put it into the tree after the tick.
@@ -79,6 +81,7 @@ class Blackboard:
     command: Command = field(default_factory=Command)
     rate: float = 1.0
     events: list[Event] = field(default_factory=list)
+    failure: Cause | None = None
 
     plan: Plan | None = None
     new_plan: Plan | None = None
@@ -104,6 +107,7 @@ class Blackboard:
         self.command = Command()
         self.rate = 1.0
         self.events = []
+        self.failure = None
 
     def move(self, arm: str, command: ArmCommand) -> None:
         """Propose motion for one arm; the gate has the last word."""
@@ -120,6 +124,12 @@ class Blackboard:
         if self.outcome is None:
             self.outcome = outcome
             self.outcome_reason = reason
+
+    @property
+    def visible_share(self) -> float | None:
+        """Share of the region of interest that is seen; None if unknown, or any reading is old."""
+        seen = self.inputs.observation.roi_visibility
+        return None if seen is None or isnan(seen) or self.inputs.missing else seen
 
     @property
     def warning_state(self) -> int | None:

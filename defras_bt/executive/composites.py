@@ -8,6 +8,8 @@ import py_trees
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from defras_bt.executive.reasons import Code
+
 
 class PlanSlot(py_trees.composites.Sequence):
     """The place in a tree where the actions of a plan are carried out, in order and once.
@@ -18,20 +20,19 @@ class PlanSlot(py_trees.composites.Sequence):
     was interrupted by a guard: the slot then fails until it is filled anew from what is now true.
 
     Attributes:
-        code: why the slot reports what it does: no_plan, plan_ready, plan_running, plan_finished,
-            plan_failed, plan_interrupted.
+        code: why the slot reports what it does: one of the codes of plans.
     """
 
     def __init__(self, name: str) -> None:
         super().__init__(name, memory=True)
-        self.code = "no_plan"
+        self.code: Code = Code.NO_PLAN
         self.feedback_message = "there is no plan"
         self._ticking = False
 
     @property
     def needs_plan(self) -> bool:
         """Whether the slot holds nothing that could be carried out: no plan, or a spent one."""
-        return self.code not in ("plan_ready", "plan_running")
+        return self.code not in (Code.PLAN_READY, Code.PLAN_RUNNING)
 
     @property
     def step(self) -> int | None:
@@ -64,7 +65,7 @@ class PlanSlot(py_trees.composites.Sequence):
                 )
         self.clear()
         self.add_children(list(actions))
-        self._say("plan_ready", f"a plan of {len(names)} actions is ready")
+        self._say(Code.PLAN_READY, f"a plan of {len(names)} actions is ready")
 
     def clear(self) -> None:
         """Terminate and remove every action.
@@ -77,7 +78,7 @@ class PlanSlot(py_trees.composites.Sequence):
         if self.status != Status.INVALID:
             self.stop(Status.INVALID)
         self.remove_all_children()
-        self._say("no_plan", "there is no plan")
+        self._say(Code.NO_PLAN, "there is no plan")
 
     def tick(self) -> Iterator[Behaviour]:
         """Carry on with the current action, or fail where there is no plan to carry out."""
@@ -93,7 +94,7 @@ class PlanSlot(py_trees.composites.Sequence):
                 step = self.step if node is self else None
                 if step is not None:
                     action = f"step {step + 1} of {len(self.children)}"
-                    self._say("plan_running", f"{action}: {self.children[step].name}")
+                    self._say(Code.PLAN_RUNNING, f"{action}: {self.children[step].name}")
                 yield node
         finally:
             self._ticking = False
@@ -102,13 +103,13 @@ class PlanSlot(py_trees.composites.Sequence):
         """Note how the plan ended; from now on it is spent."""
         last = self.feedback_message
         if new_status == Status.SUCCESS:
-            self._say("plan_finished", f"all {len(self.children)} actions are done")
+            self._say(Code.PLAN_FINISHED, f"all {len(self.children)} actions are done")
         elif new_status == Status.FAILURE:
             failed = next((c for c in self.children if c.status == Status.FAILURE), None)
             what = "" if failed is None else f" at {failed.name}: {failed.feedback_message}"
-            self._say("plan_failed", f"the plan failed{what}")
+            self._say(Code.PLAN_FAILED, f"the plan failed{what}")
         elif self.status == Status.RUNNING:
-            self._say("plan_interrupted", f"the plan was interrupted ({last})")
+            self._say(Code.PLAN_INTERRUPTED, f"the plan was interrupted ({last})")
 
-    def _say(self, code: str, message: str) -> None:
+    def _say(self, code: Code, message: str) -> None:
         self.code, self.feedback_message = code, message

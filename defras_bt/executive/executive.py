@@ -56,7 +56,7 @@ class Executive:
         self.tree: LoadedTree = load_tree(tree_file, context)
         self._board.metric = self.tree.metric
         self._bt = py_trees.trees.BehaviourTree(self.tree.root)
-        self._ticked = TickedVisitor()
+        self._ticked = TickedVisitor(self._board, self.tree)
         self._bt.add_visitor(self._ticked)
         self._actions = ActionVisitor()
         self._bt.add_visitor(self._actions)
@@ -187,7 +187,7 @@ class Executive:
     def _known(self, inputs: TickInputs, sent: Command) -> TickRecord:
         """The tick as the executive knows it; what is true only the world knows."""
         board, slot = self._board, self.tree.plan_slot
-        snapshot = self._ticked.snapshot(self.tree)
+        snapshot = self._ticked.snapshot()
         return TickRecord(
             tick=inputs.tick,
             time_s=inputs.time_s,
@@ -203,6 +203,11 @@ class Executive:
             believed=self._context.scene.attached,
             node_status=snapshot.status,
             node_message=snapshot.message,
+            node_last_status=snapshot.last_status,
+            node_code=snapshot.code,
+            node_decider=snapshot.decider,
+            cause=snapshot.cause,
+            stopped_by=snapshot.stopped_by,
             plan=board.plan,
             plan_step=slot.step if slot is not None else None,
             events=tuple(board.events),

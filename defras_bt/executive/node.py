@@ -10,6 +10,8 @@ import py_trees
 from py_trees.common import Status
 from pydantic import BaseModel, ConfigDict
 
+from defras_bt.recording.record import Cause
+
 if TYPE_CHECKING:
     from defras_bt.executive.context import Context
 
@@ -47,7 +49,8 @@ class Node(py_trees.behaviour.Behaviour):
     terminated *after* the branch that took over was ticked, so it would have the last word.
 
     Attributes:
-        code: short snake_case reason of the last status, for counting and recovery ("no_cloud").
+        code: reason of the last status, for counting and recovery: a member of
+            :class:`~defras_bt.executive.reasons.Code`, or of a package's own ``ReasonCode``.
         feedback_message: the same for people, with numbers and units.
         reported_status: the last status given by ``update()``. Pre-emption resets ``status`` to
             INVALID; this, the code and the message stay, so that a recorder can still tell.
@@ -63,6 +66,11 @@ class Node(py_trees.behaviour.Behaviour):
         self.code = ""
         self.reported_status = Status.INVALID
         self._reported = False
+
+    @property
+    def cause(self) -> Cause:
+        """Code and message of the last status."""
+        return Cause(self.code, self.feedback_message)
 
     def succeed(self, code: str, message: str) -> Status:
         """Report SUCCESS: done, or (guard) motion may go on."""

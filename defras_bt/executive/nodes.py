@@ -8,6 +8,7 @@ from py_trees.common import Status
 from pydantic import Field
 
 from defras_bt.executive.node import Node, NodeParameters, Role
+from defras_bt.executive.reasons import Code, Remedy, helps
 from defras_bt.executive.registry import register_node
 
 
@@ -44,9 +45,9 @@ class AdaptRate(Task):
         if board.inputs.force_n > board.inputs.force_threshold_n:
             reasons.append(f"{board.inputs.force_n:.2f} N")
         if not reasons:
-            return self.succeed("nominal", "full speed")
+            return self.succeed(Code.NOMINAL, "full speed")
         board.rate = self.parameters.slow
-        return self.succeed("slowed", f"slowed to {board.rate:.0%}: {', '.join(reasons)}")
+        return self.succeed(Code.SLOWED, f"slowed to {board.rate:.0%}: {', '.join(reasons)}")
 
 
 @register_node
@@ -56,11 +57,11 @@ class CalibrateRest(Task):
     def update(self) -> Status:
         calibration = self.context.monitor.calibration
         if not calibration:
-            return self.run("watching", "watching the untouched tissue")
+            return self.run(Code.WATCHING, "watching the untouched tissue")
         self.context.board.rest_calibrated = True
         for name, found in calibration.items():
             self.context.board.tell("start", f"Monitoring is calibrated, {name}: {found}.")
-        return self.succeed("calibrated", "monitoring knows the untouched tissue")
+        return self.succeed(Code.CALIBRATED, "monitoring knows the untouched tissue")
 
 
 @register_node
@@ -76,21 +77,26 @@ class Wait(Task):
     def update(self) -> Status:
         waited_s = self.context.board.inputs.time_s - self._started_s
         if waited_s < self.parameters.seconds:
-            return self.run("waiting", f"holding still: {waited_s:.1f} s")
-        return self.succeed("waited", f"held still for {waited_s:.1f} s")
+            return self.run(Code.WAITING, f"holding still: {waited_s:.1f} s")
+        return self.succeed(Code.WAITED, f"held still for {waited_s:.1f} s")
 
 
 @register_node
 class Finish(Task):
-    """End the operation: the goal is reached."""
+    """End the operation where enough of the region is seen; fail where it is not, or unknown."""
 
     def update(self) -> Status:
         board = self.context.board
-        seen = board.inputs.observation.roi_visibility or 0.0
+        seen, wanted = board.visible_share, self.context.scene.thresholds.roi_visibility
+        if seen is None or seen < wanted:
+            share = "unknown" if seen is None else f"{seen:.0%}"
+            return self.fail(
+                Code.HIDDEN, f"not at the goal: {share} of the region is visible of {wanted:.0%}"
+            )
         sentence = f"{seen:.0%} of the region of interest is visible: the goal is reached."
         board.tell("goal", sentence)
         board.end("goal", sentence)
-        return self.succeed("goal", sentence)
+        return self.succeed(Code.GOAL, sentence)
 
 
 @register_node
@@ -102,7 +108,7 @@ class AskHuman(Task):
         why = self._why()
         board.tell("human", f"Motion stopped, a human is asked to take over: {why}.", "error")
         board.end("human", why)
-        return self.succeed("asked", why)
+        return self.succeed(Code.ASKED, why)
 
     def _why(self) -> str:
         board = self.context.board
@@ -112,7 +118,26 @@ class AskHuman(Task):
             return "; ".join(board.inputs.missing)
         if (board.warning_state or 0) >= 2:
             return f"the tissue is {board.mu_m * 1e3:.1f} mm away from where the model expects it"
+        if board.failure is not None:
+            return f"no safe way to go on was found: {board.failure.message}"
         return "no safe way to go on was found"
+
+
+@register_node
+class HumanHelps(Node):
+    """Succeeds if a human can help with what stopped the operation, and nothing else did."""
+
+    role: ClassVar[Role] = "guard"
+
+    def update(self) -> Status:
+        failure = self.context.board.failure
+        if failure is None:
+            return self.fail(Code.WOULD_NOT_HELP, "nothing failed that a human could help with")
+        if not helps(Remedy.HUMAN, failure.code):
+            return self.fail(
+                Code.WOULD_NOT_HELP, f"a human does not help against this: {failure.message}"
+            )
+        return self.succeed(Code.HUMAN_HELPS, f"a human can help: {failure.message}")
 
 
 @register_node
@@ -121,7 +146,7 @@ class GiveUp(Task):
 
     def update(self) -> Status:
         board = self.context.board
-        why = board.no_plan or board.operator_refused or "no plan leads to the goal any more"
+        why = board.no_plan or "no plan leads to the goal any more"
         board.tell("end", f"The goal was not reached: {why}", "error")
         board.end("not_reached", why)
-        return self.succeed("gave_up", why)
+        return self.succeed(Code.GAVE_UP, why)

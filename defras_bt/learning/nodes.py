@@ -7,22 +7,22 @@ from typing import ClassVar
 from py_trees.common import Status
 
 from defras_bt.executive.blackboard import LearningAttempt
-from defras_bt.executive.node import Node, Role
+from defras_bt.executive.reasons import Code, Remedy
+from defras_bt.executive.recovery import RecoveryLeaf
 from defras_bt.executive.registry import register_node
 
 
 @register_node
-class LearnAttachments(Node):
+class LearnAttachments(RecoveryLeaf):
     """Estimate the attachments; adopt them only if they explain what was not fitted."""
 
-    role: ClassVar[Role] = "recovery"
+    remedy: ClassVar[Remedy] = Remedy.LEARN
 
-    def update(self) -> Status:
+    def recover(self) -> Status:
         board, context = self.context.board, self.context
         frames = context.keyframes.frames()
         if not frames:
-            board.unexplained = True
-            return self.fail("no_data", "no shape was seen since the grasp")
+            return self._cannot_learn()
         arms = board.inputs.observation.arms
         board.last_learning = LearningAttempt(
             tick=board.inputs.tick,
@@ -39,7 +39,7 @@ class LearnAttachments(Node):
         if not estimate.adopted:
             board.unexplained = True
             board.tell("learning", f"Attachments kept: {estimate.reason}", "warning", data)
-            return self.fail("rejected", estimate.reason)
+            return self.fail(Code.REJECTED, estimate.reason)
         changed = int((estimate.attached != context.scene.attached).sum())
         context.twin.set_attached(estimate.attached)
         context.monitor.twin_changed()
@@ -51,4 +51,14 @@ class LearnAttachments(Node):
             "info",
             data,
         )
-        return self.succeed("adopted", estimate.reason)
+        return self.succeed(Code.ADOPTED, estimate.reason)
+
+    def _cannot_learn(self) -> Status:
+        """Without a shape the mismatch stays unexplained, and a grip under it unsafe."""
+        board, why = self.context.board, "no shape of the tissue was seen since the grasp"
+        if not board.unexplained:
+            board.unexplained = True
+            board.tell(
+                "warning", f"Nothing can be learned about the attachments: {why}.", "warning"
+            )
+        return self.fail(Code.NO_SHAPES, why)

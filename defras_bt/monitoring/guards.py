@@ -9,6 +9,7 @@ from py_trees.common import Status
 from pydantic import Field
 
 from defras_bt.executive.node import Node, NodeParameters, Role
+from defras_bt.executive.reasons import Code
 from defras_bt.executive.registry import register_node
 
 
@@ -43,8 +44,8 @@ class SensorsFresh(Guard):
     def update(self) -> Status:
         missing = self.context.board.inputs.missing
         if missing:
-            return self.fail("stale", "; ".join(missing))
-        return self.succeed("fresh", "all readings are fresh")
+            return self.fail(Code.STALE, "; ".join(missing))
+        return self.succeed(Code.FRESH, "all readings are fresh")
 
 
 @register_node
@@ -53,8 +54,11 @@ class OperatorPermits(Guard):
 
     def update(self) -> Status:
         board = self.context.board
-        stop = board.inputs.operator_stop or board.operator_refused
-        return self.fail("stopped", stop) if stop else self.succeed("permitted", "no stop asked")
+        if board.inputs.operator_stop:
+            return self.fail(Code.STOPPED, board.inputs.operator_stop)
+        if board.operator_refused:
+            return self.fail(Code.PLAN_REFUSED, board.operator_refused)
+        return self.succeed(Code.PERMITTED, "the operator permits motion")
 
 
 @register_node
@@ -67,10 +71,10 @@ class WarningBelow(Guard):
     def update(self) -> Status:
         state = self.context.board.warning_state
         if state is None:
-            return self.fail("unknown", "the warning state is unknown")
+            return self.fail(Code.WARNING_UNKNOWN, "the warning state is unknown")
         if state >= self.parameters.state:
-            return self.fail("warned", f"warning state {state}")
-        return self.succeed("below", f"warning state {state}")
+            return self.fail(Code.WARNED, f"warning state {state}")
+        return self.succeed(Code.BELOW, f"warning state {state}")
 
 
 @register_node
@@ -83,8 +87,8 @@ class WarningReached(Guard):
     def update(self) -> Status:
         state = self.context.board.warning_state
         if state is None or state < self.parameters.state:
-            return self.fail("below", f"warning state {'unknown' if state is None else state}")
-        return self.succeed("reached", f"warning state {state}")
+            return self.fail(Code.BELOW, f"warning state {'unknown' if state is None else state}")
+        return self.succeed(Code.REACHED, f"warning state {state}")
 
 
 @register_node
@@ -98,13 +102,13 @@ class ForceAccepted(Guard):
         board = self.context.board
         force_n, limit_n = board.inputs.force_n, board.inputs.force_threshold_n
         if np.isnan(force_n):
-            return self.fail("unknown", "the force is unknown")
+            return self.fail(Code.FORCE_UNKNOWN, "the force is unknown")
         if board.force_over_s >= self.parameters.patience_s:
             return self.fail(
-                "too_high",
+                Code.FORCE_TOO_HIGH,
                 f"{force_n:.2f} N, over {limit_n:.2f} N for {board.force_over_s:.2f} s",
             )
-        return self.succeed("accepted", f"{force_n:.2f} N of {limit_n:.2f} N")
+        return self.succeed(Code.ACCEPTED, f"{force_n:.2f} N of {limit_n:.2f} N")
 
 
 @register_node
@@ -112,12 +116,12 @@ class RegionVisible(Guard):
     """Succeeds if enough of the region of interest is seen."""
 
     def update(self) -> Status:
-        seen = self.context.board.inputs.observation.roi_visibility
+        seen = self.context.board.visible_share
         wanted = self.context.scene.thresholds.roi_visibility
-        if seen is None or not seen >= wanted:
+        if seen is None or seen < wanted:
             share = "unknown" if seen is None else f"{seen:.0%}"
-            return self.fail("hidden", f"visible: {share}, wanted: {wanted:.0%}")
-        return self.succeed("visible", f"visible: {seen:.0%}")
+            return self.fail(Code.HIDDEN, f"visible: {share}, wanted: {wanted:.0%}")
+        return self.succeed(Code.VISIBLE, f"visible: {seen:.0%}")
 
 
 @register_node
@@ -126,8 +130,8 @@ class RestCalibrated(Guard):
 
     def update(self) -> Status:
         if self.context.board.rest_calibrated:
-            return self.succeed("calibrated", "rest frames are known")
-        return self.fail("not_calibrated", "rest frames are still to be seen")
+            return self.succeed(Code.CALIBRATED, "rest frames are known")
+        return self.fail(Code.NOT_CALIBRATED, "rest frames are still to be seen")
 
 
 @register_node
@@ -140,15 +144,15 @@ class LearningDue(Guard):
     def update(self) -> Status:
         board = self.context.board
         if not board.grips:
-            return self.fail("nothing_held", "nothing is held: the shape says nothing new")
+            return self.fail(Code.NOTHING_HELD, "nothing is held: the shape says nothing new")
         state = board.warning_state
         last = board.last_learning
         if last is None or (state is not None and state > last.warning_state):
-            return self.succeed("due", "not tried at this warning state yet")
+            return self.succeed(Code.DUE, "not tried at this warning state yet")
         travel_m = max(
             float(np.linalg.norm(arm.tissue_from_tip.position_m - last.tips_m[name]))
             for name, arm in board.inputs.observation.arms.items()
         )
         if travel_m >= self.parameters.travel_m:
-            return self.succeed("due", f"moved {travel_m * 1e3:.1f} mm since the last attempt")
-        return self.fail("not_due", f"moved only {travel_m * 1e3:.1f} mm since the last attempt")
+            return self.succeed(Code.DUE, f"moved {travel_m * 1e3:.1f} mm since the last attempt")
+        return self.fail(Code.NOT_DUE, f"moved only {travel_m * 1e3:.1f} mm since the last attempt")

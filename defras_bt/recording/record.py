@@ -37,14 +37,29 @@ class Event:
 
 
 @dataclass(frozen=True)
+class Cause:
+    """Why something is as it is: a code for programs, a sentence for people, and who said so.
+
+    ``path`` is that of the leaf in its tree ("defras/operate/force_accepted"); "" while unknown.
+    """
+
+    code: str
+    message: str
+    path: str = ""
+
+
+@dataclass(frozen=True)
 class TickRecord:
     """One tick as it happened. ``observation`` is after sensing: cloud and visibility filled in.
 
     ``force_n``: largest grasp force estimated by the twin, NaN while unknown; ``true_force_n`` None
     where the world has none. ``true_surface`` only for pictures. ``node_status`` maps each tree
     path ("defras/operate/act") to SUCCESS, FAILURE, RUNNING or "" where it was not ticked;
-    ``node_message`` to its last word. ``sent`` left the gate; ``proposed`` came from the tree.
-    ``believed`` (holes,) marks the attachments believed now. ``plan`` is the latest plan,
+    ``node_message`` to its last word, ``node_code`` to the code of it, ``node_last_status`` to the
+    last status it had, and ``node_decider`` to the child that decided it. ``cause`` is the leaf
+    that decided the whole tree; ``stopped_by`` the one because of which no plan is carried out,
+    None while one is, or where nobody asked. ``sent`` left the gate; ``proposed`` came from the
+    tree. ``believed`` (holes,) marks the attachments believed now. ``plan`` is the latest plan,
     ``plan_step`` the 0-based index of the action in it that is carried out, None while none is.
     """
 
@@ -65,6 +80,11 @@ class TickRecord:
     plan: Plan | None
     plan_step: int | None
     events: tuple[Event, ...] = ()
+    node_code: Mapping[str, str] = field(default_factory=dict)
+    node_last_status: Mapping[str, str] = field(default_factory=dict)
+    node_decider: Mapping[str, str] = field(default_factory=dict)
+    cause: Cause | None = None
+    stopped_by: Cause | None = None
 
     @property
     def action(self) -> Action | None:

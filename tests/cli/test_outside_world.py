@@ -107,7 +107,7 @@ def test_no_answer_is_no_approval(
     monkeypatch.setattr(sys, "stdin", io.StringIO(""))
     scene = quick_scene(tmp_path, "quick")
     code, out, _ = defras("run", scene, "--tree", "fras", "--approve", "--max-time", "5")
-    assert code == run_command.OUTCOME_CODES["not_reached"]
+    assert code == run_command.OUTCOME_CODES["human"]
     assert "did not approve" in out
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import pytest
 
+from defras_bt.planning.plan import Plan
 from defras_sim.worlds.protocol import HOLD, JAW_OPEN_RAD
 from tests.executive.stage import FORCE_TOO_HIGH_N, Stage, doing, jaws, leaves, moving, still, told
 from tests.nodes.bench import Bench
@@ -365,11 +366,19 @@ class TestOperator:
         stage.tick()
         assert stage.board.outcome == "human"
 
-    def test_plans_that_are_refused_end_the_run_without_motion(self):
+    def test_a_plan_that_is_refused_asks_a_human_without_motion(self):
         for tree in TREES:
-            stage = on_stage(tree, approve=lambda plan: False)
-            assert stage.until_over() == "not_reached"
+            asked = 0
+
+            def refuse(plan: Plan) -> bool:
+                nonlocal asked
+                asked += 1
+                return False
+
+            stage = on_stage(tree, approve=refuse, preoperative=plan_of((2, 4)))
+            assert stage.until_over() == "human"
             assert "did not approve" in stage.board.outcome_reason
+            assert asked == 1, "a refused plan is no reason to ask about the next one"
             assert all(still(record) for record in stage.notes.records)
 
 

@@ -13,9 +13,11 @@ from defras_bt.executive.blackboard import Blackboard, Grip, TickInputs
 from defras_bt.executive.context import Context
 from defras_bt.executive.grips import GripTracker
 from defras_bt.executive.node import Node
+from defras_bt.executive.reasons import ReasonCode
 from defras_bt.learning.buffer import KeyframeBuffer
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import GridPoint, Plan
+from defras_bt.recording.record import Cause
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import Scene
 from defras_sim.worlds.protocol import ArmCommand
@@ -50,6 +52,7 @@ class Bench:
         self.estimator = BenchEstimator(self.scene)
         self.keyframes = KeyframeBuffer()
         self.rehearse = BenchRehearsal()
+        self.failure: Cause | None = None
         self.board = Blackboard(self._inputs(), metric="local")
         self.grip_tracker = GripTracker(self.board, self.twin)
         self.context = Context(
@@ -78,10 +81,15 @@ class Bench:
         mu = dict.fromkeys(("local", "median"), MU_M[state] if mu_m is None else mu_m)
         self.says["reading"] = MonitorReading(0.0, mu, dict.fromkeys(mu, state))
 
+    def fails(self, code: ReasonCode, message: str = "something failed") -> None:
+        """In the next ticks, recoveries find that this has failed."""
+        self.failure = Cause(code, message)
+
     def tick(self, node: Node) -> Status:
         """Sense, tick ``node``, carry out what it proposes, and let the time of a tick pass."""
         self.grip_tracker.update(self.world.observe())
         self.board.begin_tick(self._inputs())
+        self.board.failure = self.failure
         node.tick_once()
         self.world.command(self.board.command)
         self.world.step()

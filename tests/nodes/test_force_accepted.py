@@ -12,10 +12,10 @@ from defras_bt.monitoring.guards import ForceAccepted
         (0.0, 0.0, "accepted"),
         (0.3, 0.0, "accepted"),
         (0.9, 0.45, "accepted"),
-        (0.9, 0.5, "too_high"),
-        (float("inf"), 2.0, "too_high"),
-        (float("nan"), 0.0, "unknown"),
-        (float("nan"), 2.0, "unknown"),
+        (0.9, 0.5, "force_too_high"),
+        (float("inf"), 2.0, "force_too_high"),
+        (float("nan"), 0.0, "force_unknown"),
+        (float("nan"), 2.0, "force_unknown"),
     ],
 )
 def test_force_and_time_over_the_threshold(bench, force_n, over_s, expected):

@@ -19,9 +19,3 @@ def test_the_planner_s_reason_is_passed_on(bench):
 def test_without_a_reason(bench):
     bench.tick(bench.node(GiveUp))
     assert bench.board.outcome_reason == "no plan leads to the goal any more"
-
-
-def test_a_plan_that_the_operator_refused_is_the_reason(bench):
-    bench.board.operator_refused = "the operator did not approve the plan"
-    bench.tick(bench.node(GiveUp))
-    assert bench.board.outcome_reason == "the operator did not approve the plan"

@@ -66,11 +66,17 @@ def test_without_a_shape_nothing_is_tried(bench):
     bench.hold()
     node = bench.node(LearnAttachments)
     assert bench.tick(node) == Status.FAILURE
-    assert node.code == "no_data"
+    assert node.code == "no_shapes"
     assert bench.estimator.asked == []
     assert bench.board.last_learning is None
     assert bench.board.unexplained
     assert bench.told("learning") == []
+    assert bench.told("warning") == [
+        "Nothing can be learned about the attachments: "
+        "no shape of the tissue was seen since the grasp."
+    ]
+    bench.tick(node)
+    assert bench.told("warning") == [], "told once, not every tick"
 
 
 def test_it_never_commands(bench, learn):

@@ -57,7 +57,7 @@ def test_a_jaw_that_stays_shut_needs_a_human(bench):
     bench.world.stuck.add("psm1")
     node = bench.node(LetGo)
     assert bench.run(node) == Status.FAILURE
-    assert node.code == "time_out"
+    assert node.code == "jaw_stuck"
     assert JAW_TIME_OUT_S < bench.world.time_s < JAW_TIME_OUT_S + 0.2
     assert bench.board.outcome == "human"
     assert "PSM1 should let go" in bench.board.outcome_reason

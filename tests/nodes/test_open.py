@@ -31,7 +31,7 @@ def test_a_stuck_jaw_is_reported_after_a_time_of_the_world(bench):
     node = bench.node(Open, arm="psm1", point=(2, 4))
     started_s = bench.world.time_s
     assert bench.run(node) == Status.FAILURE
-    assert node.code == "time_out"
+    assert node.code == "jaw_stuck"
     assert "stands at 0.00 rad" in node.feedback_message
     assert JAW_TIME_OUT_S < bench.world.time_s - started_s < JAW_TIME_OUT_S + 0.2
     assert bench.told("action") == []

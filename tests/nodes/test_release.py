@@ -38,6 +38,6 @@ def test_a_stuck_jaw_is_reported_and_the_grip_stays_known(bench):
     bench.world.stuck.add("psm1")
     node = bench.node(Release, arm="psm1", point=(2, 4))
     assert bench.run(node) == Status.FAILURE
-    assert node.code == "time_out"
+    assert node.code == "jaw_stuck"
     assert bench.world.time_s > JAW_TIME_OUT_S
     assert "psm1" in bench.board.grips

@@ -68,14 +68,14 @@ class TestAdoption:
     def test_no_plan_fails_with_the_planner_s_reason(self, bench):
         bench.board.blocked.update(bench.planner.points)
         node = bench.node(Replan)
-        assert (bench.tick(node), node.code) == (Status.FAILURE, "no_plan")
+        assert (bench.tick(node), node.code) == (Status.FAILURE, "impossible")
         assert "every grasp point is blocked" in bench.board.no_plan
         assert bench.board.new_plan is None
 
     def test_the_operator_can_refuse(self):
         bench = Bench(approve=lambda plan: False)
         node = bench.node(Replan)
-        assert (bench.tick(node), node.code) == (Status.FAILURE, "not_approved")
+        assert (bench.tick(node), node.code) == (Status.FAILURE, "plan_refused")
         assert bench.board.new_plan is None
         assert "did not approve" in bench.board.operator_refused
 
@@ -176,7 +176,7 @@ class TestRehearsal:
 
     def test_no_plan_at_all(self, bench, replan):
         bench.board.blocked.update(bench.planner.points)
-        assert (bench.tick(replan), replan.code) == (Status.FAILURE, "no_plan")
+        assert (bench.tick(replan), replan.code) == (Status.FAILURE, "impossible")
         assert bench.rehearse.asked == []
 
 

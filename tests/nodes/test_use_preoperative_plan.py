@@ -17,13 +17,13 @@ def test_it_is_brought_once():
     assert bench.told("plan") == ["The plan made before the operation is used: 5 actions."]
     assert bench.told("replan") == []
     bench.board.new_plan = None
-    assert (bench.tick(node), node.code) == (Status.FAILURE, "used")
+    assert (bench.tick(node), node.code) == (Status.FAILURE, "used_already")
     assert bench.board.new_plan is None
 
 
 def test_there_may_be_none(bench):
     node = bench.node(UsePreoperativePlan)
-    assert (bench.tick(node), node.code) == (Status.FAILURE, "none")
+    assert (bench.tick(node), node.code) == (Status.FAILURE, "nothing_prepared")
     assert not bench.board.preoperative_used
 
 
@@ -31,7 +31,7 @@ def test_the_operator_can_refuse_it():
     shown = []
     bench = Bench(preoperative=PLAN, approve=lambda plan: bool(shown.append(plan)))
     node = bench.node(UsePreoperativePlan)
-    assert (bench.tick(node), node.code) == (Status.FAILURE, "not_approved")
+    assert (bench.tick(node), node.code) == (Status.FAILURE, "plan_refused")
     assert shown == [PLAN]
     assert bench.board.new_plan is None
     assert "did not approve" in bench.board.operator_refused

@@ -25,7 +25,7 @@ def test_an_unknown_state_permits_nothing(bench):
         "the tree names no metric": lambda: setattr(bench.board, "metric", None),
     }.items():
         silence()
-        assert (bench.tick(node), node.code) == (Status.FAILURE, "unknown"), why
+        assert (bench.tick(node), node.code) == (Status.FAILURE, "warning_unknown"), why
         bench.warn(0)
 
 
