@@ -31,6 +31,10 @@ from defras_sim.scene import Scene
 # Both arms let go, one reaches, opens, grasps, pulls, moves and folds.
 MAX_HORIZON = 8
 
+# Every belief makes a control a little slower (5x5 points: 0.02 ms a plan, 10x10: 0.2 ms); a new
+# control costs as much as some plans.
+MAX_BELIEFS = 16
+
 
 class NoPlan(Exception):
     """The region cannot be exposed. ``obstacles``: an irreducible set of facts in the way."""
@@ -43,7 +47,7 @@ class NoPlan(Exception):
 
 
 class Planner:
-    """Plans for one scene. One clingo control lives as long as the planner does.
+    """Plans for one scene. A clingo control lives for many plans.
 
     One optimisation finds the best plan and proves it: fewest actions first, then what
     asp/grasp_choice.lp prefers. The best is unique, so the answer does not depend on what was
@@ -68,7 +72,8 @@ class Planner:
         self.max_horizon = max_horizon
         self.budget_s = budget_s
         files = [resource(name) for name in PROGRAMS] if programs is None else list(programs)
-        self._program = RetractionProgram(scene_facts(scene), files, max_horizon)
+        self._files = files
+        self._program = self._grounded()
         self._roi_mm = roi_distances_mm(scene)
 
     def plan(
@@ -96,12 +101,17 @@ class Planner:
         require_valid(self.scene, situation, needed, required_grasp)
         world = world_atoms(situation, needed, required_grasp)
         attachment_mm = attachment_distances_mm(self.scene, attached)
+        if self._program.beliefs >= MAX_BELIEFS:
+            self._program = self._grounded()
         self._program.set_world(world)
         self._program.set_belief(belief_facts(attachment_mm))
         answer = self._program.best(self.budget_s)
         if answer is None:
             raise NoPlan(self.max_horizon, self._obstacles(world, required_grasp))
         return self._plan_from(answer, situation, attachment_mm)
+
+    def _grounded(self) -> RetractionProgram:
+        return RetractionProgram(scene_facts(self.scene), self._files, self.max_horizon)
 
     def _plan_from(
         self, answer: Answer, situation: Situation, attachment_mm: dict[GridPoint, int]

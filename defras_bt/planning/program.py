@@ -53,6 +53,11 @@ class RetractionProgram:
         self._belief: tuple[int, str] | None = None
         self._beliefs = 0
 
+    @property
+    def beliefs(self) -> int:
+        """How many beliefs this control has seen."""
+        return self._beliefs
+
     def set_world(self, atoms: Iterable[Symbol]) -> None:
         """Make exactly these external atoms true."""
         wanted = frozenset(atoms)
@@ -65,7 +70,8 @@ class RetractionProgram:
     def set_belief(self, facts: str) -> None:
         """Take over distances to the believed attachments; ``k`` in them is the belief's number.
 
-        Old beliefs are released for good, so that they cost nothing any more.
+        Old beliefs are released for good, but clingo still looks through their atoms when it
+        grounds: see :attr:`beliefs`.
         """
         if self._belief is not None and self._belief[1] == facts:
             return
