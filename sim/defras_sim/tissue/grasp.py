@@ -41,6 +41,14 @@ class Grasp:
         pose = self.tissue_from_tip
         return self.tip_targets_m @ pose.rotation.T + self.shifts[:, None] * pose.position_m
 
+    def targets_by_tip_m(self) -> Floats:
+        """Derivatives (rows, 3, 6) of the targets by the tip's translation, then by its rotation
+        [rad] about itself, both along the axes of the tissue frame."""
+        seen = self.tip_targets_m @ self.tissue_from_tip.rotation.T
+        moved = self.shifts[:, None, None] * np.eye(3)
+        turned = np.stack([np.cross(axis, seen) for axis in np.eye(3)], axis=2)
+        return np.concatenate([moved, turned], axis=2)
+
     def term(self, arm: str) -> SpringTerm:
         """The boundary term by which ``arm`` holds the tissue."""
         return SpringTerm(term_name(arm), self.springs, self.targets_m)

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from defras_sim.geometry import Floats
+from defras_sim.tissue.mesh import Integers
+from defras_sim.tissue.springs import ROWS, SpringTerm
+from defras_sim.tissue.surface import SurfaceMap
 
 
 @dataclass(frozen=True)
@@ -20,3 +26,27 @@ class HoleResponse:
     surface_m_per_n: Floats
     holes_m_per_n: Floats
     stretch_m: Floats
+
+
+def hole_response(
+    attachments: SpringTerm,
+    positions_m: Floats,
+    surface: SurfaceMap,
+    solve: Callable[[Floats], Floats],
+    holes: Integers,
+) -> HoleResponse:
+    """The response to forces where ``holes`` hold, at the equilibrium ``positions_m`` (nodes, 3).
+
+    ``solve`` gives the motion (3 nodes, columns) for nodal forces (3 nodes, columns).
+    """
+    chosen = np.asarray(holes, dtype=np.int64)
+    rows = (ROWS * chosen[:, None] + np.arange(ROWS)).ravel()
+    on_holes = attachments.springs.rows[rows].toarray()
+    stretch = on_holes @ positions_m - attachments.targets_m[rows]
+    by_node = solve(np.kron(on_holes.T, np.eye(3))).reshape(len(positions_m), -1)
+    count, size = len(chosen), 3 * ROWS
+    return HoleResponse(
+        (surface.from_nodes @ by_node).reshape(-1, 3, count, size),
+        (on_holes @ by_node).reshape(count, size, count, size),
+        stretch.reshape(count, size),
+    )

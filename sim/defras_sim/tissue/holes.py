@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene, hole_stiffness_n_per_m
-from defras_sim.tissue.mesh import Integers, Mesh
+from defras_sim.tissue.mesh import Mesh
 from defras_sim.tissue.springs import ROWS, Springs, SpringTerm, disc_rows
 
 TERM_NAME = "attachments"
@@ -55,9 +54,3 @@ class Holes:
 
     def _with_stiffness(self, stiffness_n_per_m: Floats) -> Springs:
         return Springs(self._rows, np.repeat(stiffness_n_per_m, ROWS))
-
-    def rows_of(self, holes: Integers) -> tuple[sparse.csr_array, Floats]:
-        """What some holes hold: rows (3 holes, nodes), and targets (3 holes, 3) of those."""
-        chosen = np.asarray(holes, dtype=np.int64)
-        rows = (ROWS * chosen[:, None] + np.arange(ROWS)).ravel()
-        return self._rows[rows], self.targets_m[rows]

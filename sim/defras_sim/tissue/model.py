@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse.linalg import SuperLU
 
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import ElementName, MaterialName, Scene
@@ -15,22 +16,27 @@ from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.bed import bed_under
 from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.grasp import Grasp, NothingToGrasp
-from defras_sim.tissue.hole_response import HoleResponse
+from defras_sim.tissue.hole_response import HoleResponse, hole_response
 from defras_sim.tissue.holes import Holes
 from defras_sim.tissue.loads import gravity
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import Integers, slab_mesh
+from defras_sim.tissue.parameters import Parameter
 from defras_sim.tissue.path import length_m
 from defras_sim.tissue.readout import tissue_state
 from defras_sim.tissue.rest import is_loaded, lying_m, settled
-from defras_sim.tissue.solver import NewtonSettings, NewtonSolver
-from defras_sim.tissue.springs import ROWS
+from defras_sim.tissue.sensitivity import Sensitivities, sensitivities
+from defras_sim.tissue.solver import NewtonSettings, NewtonSolver, factorised
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.surface import surface_map
 from defras_sim.tissue.terms import Term
 from defras_sim.tissue.travel import Tips, Traveller
 
 __all__ = ["NothingToGrasp", "TissueModel", "TissueSnapshot"]
+
+
+# Times the residual at which a solve has converged: more means that something changed since.
+UNBALANCED = 2.0
 
 
 @dataclass(frozen=True)
@@ -85,6 +91,7 @@ class TissueModel:
             self._holes.anchor_at(self._rest_m)
         self._rest_is_known = False
         self._energy = self._assembled()
+        self._factorised: tuple[PotentialEnergy, Floats, SuperLU] | None = None
         self._positions_m = self.rest_m.copy()
 
     @property
@@ -229,20 +236,49 @@ class TissueModel:
                 self._place(before)
         return self._state(converged, iterations)
 
+    def sensitivities(self, parameters: Sequence[Parameter]) -> Sensitivities:
+        """Derivatives of positions and forces at the last equilibrium by ``parameters``.
+
+        Example:
+            >>> tip = TipMotion("psm1")
+            >>> by = model.sensitivities([YOUNG_MODULUS_SCALE, HoleStiffness(17), tip])
+            >>> felt_stiffness = by.grasp_forces_by["psm1"][:, by.columns[tip]]
+
+        Raises:
+            ValueError: a parameter does not exist or is given twice, or something was changed and
+                not solved since.
+        """
+        _, gradient = self._energy.energy_and_gradient(self._positions_m)
+        if not np.linalg.norm(gradient) <= UNBALANCED * self._solver.settings.residual_n:
+            raise ValueError(
+                "sensitivities belong to an equilibrium; call solve first "
+                f"({np.linalg.norm(gradient):.2g} N are unbalanced)"
+            )
+        return sensitivities(
+            self._energy,
+            self._grasps,
+            self._positions_m,
+            self._surface,
+            self._response,
+            parameters,
+        )
+
     def response_to_hole_forces(self, holes: Integers) -> HoleResponse:
         """Linear response of the surface and of ``holes`` to forces where ``holes`` hold."""
-        x = self._positions_m
-        rows, targets_m = self._holes.rows_of(holes)
-        on_holes = rows.toarray()
-        stretch = on_holes @ x - targets_m
-        motion = self._solver.solve_tangent(self._energy.tangent(x), np.kron(on_holes.T, np.eye(3)))
-        by_node = motion.reshape(len(x), -1)
-        count, size = len(holes), 3 * ROWS
-        return HoleResponse(
-            (self._surface.from_nodes @ by_node).reshape(-1, 3, count, size),
-            (on_holes @ by_node).reshape(count, size, count, size),
-            stretch.reshape(count, size),
+        return hole_response(
+            self._holes.term, self._positions_m, self._surface, self._response, holes
         )
+
+    def _response(self, forces_n: Floats) -> Floats:
+        """Motion (3 nodes, columns) per nodal forces (3 nodes, columns), at the last equilibrium.
+
+        The factorisation is kept for as long as the equilibrium stays.
+        """
+        known = self._factorised
+        if known is None or known[0] is not self._energy or known[1] is not self._positions_m:
+            factor = factorised(self._energy.tangent(self._positions_m))
+            known = self._factorised = (self._energy, self._positions_m, factor)
+        return known[2].solve(forces_n)
 
     def _changed(self) -> None:
         """What holds the tissue is different from now on."""
