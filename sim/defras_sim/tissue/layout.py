@@ -32,32 +32,43 @@ class TangentLayout:
     def of(nodes: int, pairs: Iterable[Integers]) -> TangentLayout:
         """The smallest that holds all ``pairs``: each (m, 2) of row node and column node."""
         both = np.concatenate([np.zeros((0, 2), dtype=np.int64), *pairs])
-        keys = np.unique(both[:, 1] * nodes + both[:, 0])
-        columns, rows = np.divmod(keys, nodes)
-        starts = np.searchsorted(columns, np.arange(nodes + 1))
-        graph = sparse.csc_array((np.ones(len(keys)), rows, starts), shape=(nodes, nodes))
+        entries = (np.ones(len(both)), (both[:, 0], both[:, 1]))
+        graph = sparse.csc_array(entries, shape=(nodes, nodes))
+        graph.sum_duplicates()  # and sorts
         return TangentLayout(graph)
 
     @cached_property
     def pattern(self) -> sparse.csc_array:
         """The matrix (3 nodes, 3 nodes) with all its entries zero."""
-        pattern = sparse.csc_array(sparse.kron(self.graph, np.ones((3, 3)), format="csc"))
-        pattern.sort_indices()
-        pattern.data[:] = 0.0
+        graph, size = self.graph, 3 * self.graph.shape[0]
+        starts = self._starts(np.arange(graph.nnz), self._columns)[:, :, None] + np.arange(3)
+        rows = 3 * graph.indices[:, None, None] + np.arange(3)
+        indices = np.empty(starts.size, dtype=np.int32)
+        indices[starts] = rows
+        heights = np.repeat(3 * np.diff(graph.indptr), 3)
+        indptr = np.concatenate([[0], np.cumsum(heights)]).astype(np.int32)
+        pattern = sparse.csc_array((np.zeros(starts.size), indices, indptr), shape=(size, size))
+        pattern.has_sorted_indices = True
         return pattern
 
     @cached_property
-    def _keys(self) -> Integers:
-        nodes = np.int64(self.graph.shape[0])
-        return np.repeat(np.arange(nodes), np.diff(self.graph.indptr)) * nodes + self.graph.indices
+    def _columns(self) -> Integers:
+        """Column node (m,) of each entry of the graph."""
+        nodes = self.graph.shape[0]
+        return np.repeat(np.arange(nodes, dtype=np.int64), np.diff(self.graph.indptr))
 
     def places(self, pairs: Integers) -> Places:
         """Where the blocks of ``pairs`` (m, 2), which the layout holds, stand."""
-        rows, columns = pairs[:, 0], pairs[:, 1]
-        start = self.graph.indptr[columns].astype(np.int64)
+        nodes = self.graph.shape[0]
+        keys = self._columns * nodes + self.graph.indices
+        entries = np.searchsorted(keys, pairs[:, 1] * nodes + pairs[:, 0])
+        return self._starts(entries, pairs[:, 1])
+
+    def _starts(self, entries: Integers, columns: Integers) -> Places:
+        """Places of the graph's ``entries`` (m,), which stand in ``columns`` (m,)."""
+        before = self.graph.indptr[columns].astype(np.int64)
         height = np.diff(self.graph.indptr)[columns].astype(np.int64)
-        within = np.searchsorted(self._keys, columns * self.graph.shape[0] + rows) - start
-        first = 9 * start + 3 * within
+        first = 9 * before + 3 * (entries - before)
         return (first[:, None] + 3 * height[:, None] * np.arange(3)).astype(np.int32)
 
     def matrix(self, entries: Floats) -> sparse.csc_array:
