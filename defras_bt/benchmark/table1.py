@@ -11,6 +11,7 @@ from joblib import Parallel, delayed
 from defras_bt.executive.executive import ExecutiveFailed
 from defras_bt.executive.operation import Operation, operate
 from defras_bt.executive.tree_file import read_tree
+from defras_bt.planning.engine import Engine
 from defras_bt.planning.preparation import needs_plan, prepare
 from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
 from defras_sim.resources import resource
@@ -44,7 +45,9 @@ def table1(world: str, trees: Sequence[str] = TREES, seed: int = 0, jobs: int = 
 def _runs_of(scene: str, world: str, trees: tuple[str, ...], seed: int) -> list[Row]:
     believed_file = resource(f"sim/scenes/{scene}.yaml")
     believed = load_scene(believed_file)
-    prepared = prepare(believed.for_bullet() if world == "bullet" else believed)
+    prepared = prepare(
+        believed.for_bullet() if world == "bullet" else believed, engine=Engine(jobs=1)
+    )
     rows = []
     for relation in RELATIONS:
         actual_file = resource(f"sim/scenes/{scene}_{relation}.yaml")

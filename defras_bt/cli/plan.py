@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -12,49 +14,102 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import find_scene, folder_for
 from defras_bt.executive.operation import WORLDS
+from defras_bt.planning.engine import (
+    VALID,
+    Engine,
+    EngineUnavailable,
+    UnknownEngine,
+    engine_named,
+)
 from defras_bt.planning.english import plan_text
+from defras_bt.planning.journal import InvalidJournal, Journal
 from defras_bt.planning.plan_file import InvalidPlanFile, StalePlanFile, save_plan
-from defras_bt.planning.preoperative import PreoperativeResult
+from defras_bt.planning.preoperative import PreoperativeResult, preoperative_plans
 from defras_bt.planning.preparation import Preparation, prepare
+from defras_bt.planning.rehearsals import Progress as Report
 from defras_sim.scene import Scene
 
 
 def plan(
-    scene: Annotated[str, typer.Argument(help="Scene as believed: a file, or a shipped name.")],
+    scenes: Annotated[list[str], typer.Argument(help="Scenes as believed: files, shipped names.")],
     world: Annotated[str, typer.Option(help="World the plan is for: model or bullet.")] = "model",
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Plan file (JSON).")] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="Rehearsals side by side.")] = 2,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Plan file (JSON); with several scenes, a folder."),
+    ] = None,
+    jobs: Annotated[
+        int, typer.Option(min=-1, help="Rehearsals side by side; -1: one per core.")
+    ] = -1,
+    engine: Annotated[str, typer.Option(help=f"Where to rehearse: {VALID}.")] = "local",
 ) -> None:
     """Rehearse every retraction in simulation and choose the plan for this patient.
 
-    Also derives the force threshold, twice the median of the rehearsals' largest forces.
+    Also derives the force threshold, twice the median of the largest forces of all rehearsals of
+    all scenes given. With --out a search that was killed goes on where it was.
 
     Example: defras plan sim1 -o sim1.plan.json; defras run sim1 --plan sim1.plan.json
+
+    Example: defras plan sim1 sim2 sim3 --out plans --engine dask
     """
     if world not in WORLDS:
         raise UserError(f"--world {world}: valid are {', '.join(WORLDS)}")
-    _, believed = find_scene(scene)
-    if out is not None:
-        folder_for(out.parent)  # before minutes of rehearsals, not after
+    if jobs == 0:
+        raise UserError("--jobs 0: give a number of processes, or -1 for one per core")
+    believed = [find_scene(scene)[1] for scene in scenes]
+    try:
+        where = engine_named(engine, jobs)
+    except UnknownEngine as error:
+        raise UserError(f"--{error}") from error
+    files = _plan_files(believed, out)  # before minutes of rehearsals, not after
+    console = Console(soft_wrap=True, highlight=False)
+    journal = None
+    try:
+        if files:
+            journal = Journal(files[0].with_name("rehearsals.journal"))
+        with _progress(console) as report:
+            results = preoperative_plans(
+                [scene.for_bullet() if world == "bullet" else scene for scene in believed],
+                engine=where,
+                journal=journal,
+                progress=report,
+            )
+    except (EngineUnavailable, InvalidJournal) as error:
+        raise UserError(str(error)) from error
+    for i, result in enumerate(results):
+        if len(results) > 1:
+            console.print(f"Scene {result.scene}:", markup=False)
+        tell(result, console)
+        if files:
+            try:
+                save_plan(result, files[i])
+            except OSError as error:
+                raise UserError(f"--out {out}: {error}") from error
+            console.print(f"Written to {files[i]}", markup=False)
+    if journal is not None:
+        journal.file.unlink(missing_ok=True)
+
+
+def _plan_files(scenes: list[Scene], out: Path | None) -> list[Path]:
+    """Where each scene's plan goes; none without ``out``. The folder exists afterwards."""
+    if out is None:
+        return []
+    if len(scenes) == 1:
+        folder_for(out.parent)
         if out.is_dir():
             raise UserError(f"--out {out} is a folder; give the name of a file")
-    console = Console(soft_wrap=True, highlight=False)
-    prepared = rehearsed(believed.for_bullet() if world == "bullet" else believed, console, jobs)
-    if prepared.result is None:
-        raise RuntimeError("preparing a plan gave no plan")
-    tell(prepared.result, console)
-    if out is not None:
-        try:
-            save_plan(prepared.result, out)
-        except OSError as error:
-            raise UserError(f"--out {out}: {error}") from error
-        console.print(f"Written to {out}", markup=False)
+        return [out]
+    names = [scene.name for scene in scenes]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise UserError(f"several scenes are named {', '.join(twice)}; plan them one by one")
+    folder_for(out)
+    return [out / f"{name}.plan.json" for name in names]
 
 
 def rehearsed(
     scene: Scene,
     console: Console,
-    jobs: int = 2,
+    jobs: int = -1,
     *,
     with_plan: bool = True,
     plan_file: Path | None = None,
@@ -64,6 +119,22 @@ def rehearsed(
     Raises:
         UserError: the plan file does not fit.
     """
+    with _progress(console) as report:
+        try:
+            return prepare(
+                scene,
+                with_plan=with_plan,
+                plan_file=plan_file,
+                engine=Engine(jobs=jobs),
+                progress=report,
+            )
+        except (InvalidPlanFile, StalePlanFile) as error:
+            raise UserError(f"--plan: {error}") from error
+
+
+@contextmanager
+def _progress(console: Console) -> Iterator[Report]:
+    """A bar with the time left; off a terminal a line at every fifth of the way."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -74,16 +145,13 @@ def rehearsed(
         *columns, console=console, transient=True, disable=not console.is_terminal
     ) as bar:
         task = bar.add_task("rehearsing grasp points", total=None)
-        try:
-            return prepare(
-                scene,
-                with_plan=with_plan,
-                plan_file=plan_file,
-                jobs=jobs,
-                progress=lambda done, total: bar.update(task, completed=done, total=total),
-            )
-        except (InvalidPlanFile, StalePlanFile) as error:
-            raise UserError(f"--plan: {error}") from error
+
+        def report(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+            if not console.is_terminal and (5 * done) // total > (5 * (done - 1)) // total:
+                console.print(f"rehearsing grasp points: {done} of {total}", markup=False)
+
+        yield report
 
 
 def tell(result: PreoperativeResult, console: Console) -> None:

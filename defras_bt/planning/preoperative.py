@@ -7,40 +7,23 @@ expose the region within epsilon the three with the lowest F_max, of these the s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from joblib import Parallel, delayed, parallel_config
 
+from defras_bt.planning.engine import Engine
 from defras_bt.planning.english import point_text
-from defras_bt.planning.plan import ArmSituation, GridPoint, Plan, Situation
+from defras_bt.planning.execution import Execution
+from defras_bt.planning.journal import Journal
+from defras_bt.planning.plan import ArmSituation, Plan, Situation
 from defras_bt.planning.planner import Planner
+from defras_bt.planning.rehearsals import STEP_M, Progress, rehearse_all
 from defras_bt.planning.scene_hash import scene_hash
-from defras_sim.retraction import SEQUENCES, Rehearser
 from defras_sim.scene import Scene
 
-Progress = Callable[[int, int], None]
-"""Called with (grasp points rehearsed, of how many), always in the same order."""
-
-STEP_M = 0.004
 THRESHOLD_OVER_MEDIAN = 2.0
 LOWEST_FORCES_KEPT = 3
-
-
-@dataclass(frozen=True)
-class Execution:
-    """One rehearsed retraction, which ends where the region is exposed, as a real one does.
-
-    ``manoeuvres`` are those begun. ``visibility`` (0..1) is the best seen. ``finished`` is False
-    where the tissue model could not follow the motion to its end.
-    """
-
-    point: GridPoint
-    manoeuvres: tuple[str, ...]
-    visibility: float
-    force_max_n: float
-    finished: bool
 
 
 class NothingToRetract(ValueError):
@@ -62,23 +45,65 @@ class PreoperativeResult:
 
 
 def preoperative_plan(
-    scene: Scene, *, jobs: int = 2, progress: Progress | None = None, step_m: float = STEP_M
+    scene: Scene,
+    *,
+    engine: Engine | None = None,
+    journal: Journal | None = None,
+    progress: Progress | None = None,
+    step_m: float = STEP_M,
 ) -> PreoperativeResult:
     """Rehearse all retractions of ``scene``, choose one, and plan it.
-
-    Without a retraction that qualifies, the plan is the one that the ASP optimisation prefers.
 
     Raises:
         NoPlan: no arm can reach any grasp point.
         NothingToRetract: the region is visible as things are.
     """
-    executions = rehearse_all(scene, jobs=jobs, progress=progress, step_m=step_m)
+    return preoperative_plans(
+        [scene], engine=engine, journal=journal, progress=progress, step_m=step_m
+    )[0]
+
+
+def preoperative_plans(
+    scenes: Sequence[Scene],
+    *,
+    engine: Engine | None = None,
+    journal: Journal | None = None,
+    progress: Progress | None = None,
+    step_m: float = STEP_M,
+) -> list[PreoperativeResult]:
+    """Rehearse all retractions of all ``scenes``; epsilon comes from all of them together.
+
+    Without a retraction that qualifies, a scene's plan is the one that the ASP optimisation
+    prefers. A scene that states its own threshold keeps it.
+
+    Raises:
+        NoPlan: no arm can reach any grasp point.
+        NothingToRetract: a region is visible as things are.
+    """
+    rehearsed = rehearse_all(
+        scenes, engine=engine, journal=journal, progress=progress, step_m=step_m
+    )
+    median_n = median_force_n([execution for of_scene in rehearsed for execution in of_scene])
+    return [
+        result_of(scene, executions, median_n)
+        for scene, executions in zip(scenes, rehearsed, strict=True)
+    ]
+
+
+def result_of(
+    scene: Scene, executions: tuple[Execution, ...], median_n: float
+) -> PreoperativeResult:
+    """What the ``executions`` of ``scene`` say, where ``median_n`` is F_m.
+
+    Raises:
+        NoPlan: no arm can reach any grasp point.
+        NothingToRetract: the region is visible as things are.
+    """
     if executions and not any(execution.manoeuvres for execution in executions):
         raise NothingToRetract(
             f"scene {scene.name!r}: {executions[0].visibility:.0%} of the region is visible before "
             "anything is moved; put the region deeper under the tissue"
         )
-    median_n = median_force_n(executions)
     limit_n = scene.thresholds.force_n or THRESHOLD_OVER_MEDIAN * median_n
     chosen = choose(executions, scene.thresholds.roi_visibility, limit_n)
     planner, situation = Planner(scene), Situation({name: ArmSituation() for name in scene.arms})
@@ -110,48 +135,6 @@ def preoperative_plan(
     )
 
 
-def force_threshold_over(
-    scenes: Sequence[Scene],
-    *,
-    jobs: int = 2,
-    progress: Progress | None = None,
-    step_m: float = STEP_M,
-) -> float:
-    """Epsilon [N] from all executions of all ``scenes`` together, as the paper derives it."""
-    executions: list[Execution] = []
-    total = sum(len(_reachable_points(scene)) for scene in scenes)
-    before = 0
-    for scene in scenes:
-
-        def report(done: int, _: int, before: int = before) -> None:
-            if progress is not None:
-                progress(before + done, total)
-
-        executions += rehearse_all(scene, jobs=jobs, progress=report, step_m=step_m)
-        before += len(_reachable_points(scene))
-    return THRESHOLD_OVER_MEDIAN * median_force_n(executions)
-
-
-def rehearse_all(
-    scene: Scene, *, jobs: int = 2, progress: Progress | None = None, step_m: float = STEP_M
-) -> tuple[Execution, ...]:
-    """Every reachable grasp point with every sequence of manoeuvres, in a fixed order.
-
-    A sequence that exposes the region before its last manoeuvre equals a shorter one and is listed
-    once.
-    """
-    points = _reachable_points(scene)
-    executions: list[Execution] = []
-    with parallel_config(backend="loky", inner_max_num_threads=1):
-        tasks = (delayed(_rehearse_point)(scene, point, step_m) for point in points)
-        results = Parallel(n_jobs=jobs, return_as="generator")(tasks)
-        for done, of_point in enumerate(results, start=1):
-            executions += of_point
-            if progress is not None:
-                progress(done, len(points))
-    return tuple(executions)
-
-
 def choose(executions: Iterable[Execution], visibility: float, limit_n: float) -> Execution | None:
     """Of the three gentlest that expose within the force limit the shortest, else the gentler."""
     qualified = [e for e in executions if e.visibility >= visibility and e.force_max_n <= limit_n]
@@ -164,25 +147,6 @@ def median_force_n(executions: Sequence[Execution]) -> float:
     if not executions:
         raise ValueError("no retraction was rehearsed, so there is no force to take the median of")
     return float(np.median([execution.force_max_n for execution in executions]))
-
-
-def _rehearse_point(scene: Scene, point: GridPoint, step_m: float) -> list[Execution]:
-    rehearser = Rehearser(scene, step_m=step_m, stop_when_exposed=True)
-    found: dict[tuple[str, ...], Execution] = {}
-    for sequence in SEQUENCES:
-        rehearsal = rehearser.run(point, sequence)
-        found[rehearsal.manoeuvres] = Execution(
-            point=point,
-            manoeuvres=rehearsal.manoeuvres,
-            visibility=rehearsal.best_visibility,
-            force_max_n=rehearsal.force_max_n,
-            finished=rehearsal.finished,
-        )
-    return list(found.values())
-
-
-def _reachable_points(scene: Scene) -> tuple[GridPoint, ...]:
-    return tuple(point for point in scene.grasp_points if scene.arms_at(*point))
 
 
 def _why_none(executions: Sequence[Execution], visibility: float, limit_n: float) -> str:

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from defras_bt.executive.tree_spec import TreeSpec
+from defras_bt.planning.engine import Engine
 from defras_bt.planning.plan import Plan
 from defras_bt.planning.plan_file import load_plan
-from defras_bt.planning.preoperative import PreoperativeResult, Progress, preoperative_plan
+from defras_bt.planning.preoperative import PreoperativeResult, preoperative_plan
+from defras_bt.planning.rehearsals import Progress
 from defras_sim.scene import Scene
 
 
@@ -34,7 +36,7 @@ def prepare(
     *,
     with_plan: bool = True,
     plan_file: Path | None = None,
-    jobs: int = 1,
+    engine: Engine | None = None,
     progress: Progress | None = None,
 ) -> Preparation:
     """Read the plan file, or rehearse now. Without a plan to make and with a threshold in the
@@ -49,5 +51,5 @@ def prepare(
         return Preparation(result.force_threshold_n, result)
     if not with_plan and scene.thresholds.force_n is not None:
         return Preparation(scene.thresholds.force_n, None)
-    result = preoperative_plan(scene, jobs=jobs, progress=progress)
+    result = preoperative_plan(scene, engine=engine, progress=progress)
     return Preparation(result.force_threshold_n, result if with_plan else None)

@@ -5,19 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from defras_bt.planning.engine import Engine
 from defras_bt.planning.plan_file import InvalidPlanFile, StalePlanFile, load_plan, save_plan
 from defras_bt.planning.preoperative import (
     Execution,
     NothingToRetract,
     choose,
-    force_threshold_over,
     median_force_n,
     preoperative_plan,
+    preoperative_plans,
 )
 from defras_bt.planning.scene_hash import scene_hash
 from tests.planning.conftest import make_scene
 
 STEP_M = 0.01
+ALONE = Engine(jobs=1)
 
 
 def execution(point, manoeuvres, visibility, force_max_n):
@@ -60,7 +62,7 @@ def test_a_region_that_is_visible_already_is_said_so():
     limits = scene.thresholds.model_copy(update={"roi_visibility": 0.05})
     seen = scene.model_copy(update={"roi": roi, "thresholds": limits})
     with pytest.raises(NothingToRetract, match=r"\d+% of the region is visible before"):
-        preoperative_plan(seen, jobs=1)
+        preoperative_plan(seen, engine=ALONE)
 
 
 @pytest.fixture(scope="module")
@@ -73,14 +75,14 @@ def small():
 def rehearsed(small):
     ticks = []
     result = preoperative_plan(
-        small, jobs=1, step_m=STEP_M, progress=lambda *tick: ticks.append(tick)
+        small, engine=ALONE, step_m=STEP_M, progress=lambda *tick: ticks.append(tick)
     )
     return result, ticks
 
 
 def test_executions_threshold_and_progress(small, rehearsed):
     result, ticks = rehearsed
-    assert ticks == [(1, 2), (2, 2)]
+    assert ticks == [(0, 2), (1, 2), (2, 2)]
     assert {e.point for e in result.executions} == {(1, 1), (2, 1)}
     keys = [(e.point, e.manoeuvres) for e in result.executions]
     assert len(keys) == len(set(keys)) <= 8
@@ -109,7 +111,7 @@ def with_thresholds(scene, **changes):
 
 def test_threshold_of_the_scene_counts_and_nothing_qualifies(small):
     strict = with_thresholds(small, force_n=1e-6)
-    result = preoperative_plan(strict, jobs=1, step_m=STEP_M)
+    result = preoperative_plan(strict, engine=ALONE, step_m=STEP_M)
     assert result.force_threshold_n == 1e-6
     assert result.chosen is None
     assert result.plan.source == "asp"
@@ -118,12 +120,14 @@ def test_threshold_of_the_scene_counts_and_nothing_qualifies(small):
 
 
 def test_jobs_change_nothing_and_scenes_pool(small, rehearsed):
-    ticks = []
-    threshold_n = force_threshold_over(
-        [small, small], jobs=2, step_m=STEP_M, progress=lambda *tick: ticks.append(tick)
+    """Of two scenes, one of them with stiffer tissue, epsilon comes from all rehearsals."""
+    stiff = small.model_copy(
+        update={"tissue": small.tissue.model_copy(update={"young_modulus_pa": 6000.0})}
     )
-    assert ticks == [(1, 4), (2, 4), (3, 4), (4, 4)]
-    assert threshold_n == pytest.approx(rehearsed[0].force_threshold_n, rel=1e-9)
+    one, other = preoperative_plans([small, stiff], engine=Engine(jobs=2), step_m=STEP_M)
+    assert one.executions == rehearsed[0].executions
+    forces_n = [e.force_max_n for result in (one, other) for e in result.executions]
+    assert one.force_threshold_n == other.force_threshold_n == 2 * np.median(forces_n)
 
 
 def test_plan_file_round_trip(small, rehearsed, tmp_path):
