@@ -15,7 +15,9 @@ from defras_sim.tissue.material_points import MaterialPoints
 from defras_sim.tissue.mesh import Integers, Mesh
 from defras_sim.tissue.terms import unknown_parameter
 
-_SCALE, _POISSON = "stiffness_scale", "poisson_ratio"
+_SCALE, _POISSON, _THICKNESS = "stiffness_scale", "poisson_ratio", "thickness_scale"
+# Of the difference that stands for the derivative by the thickness; its error is the square of it.
+_THICKNESS_STEP = 1e-5
 
 
 class ElasticBody:
@@ -26,8 +28,9 @@ class ElasticBody:
     (elements, 1), they are spread over the quadrature points.
 
     Parameters: ``stiffness_scale`` multiplies both; ``poisson_ratio`` changes at fixed Young's
-    modulus; every one of ``modes`` (elements, points) is a field by which the stiffness grows: a
-    mode's strength s makes it 1 + s mode times as stiff, and derivatives are taken at s = 0.
+    modulus; ``thickness_scale`` multiplies the rest shape's thickness; every one of ``modes``
+    (elements, points) is a field by which the stiffness grows: a mode's strength s makes it
+    1 + s mode times as stiff, and derivatives are taken at s = 0.
     """
 
     name = "material"
@@ -55,7 +58,7 @@ class ElasticBody:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        return (_SCALE, _POISSON, *self.modes)
+        return (_SCALE, _POISSON, _THICKNESS, *self.modes)
 
     @property
     def pairs(self) -> Integers:
@@ -65,6 +68,12 @@ class ElasticBody:
         """The same body with other parameters of its material."""
         return ElasticBody(
             self.mesh, self.material, mu_pa, lam_pa, modes=self.modes, points=self.points
+        )
+
+    def with_points(self, points: MaterialPoints) -> ElasticBody:
+        """The same material on another rest shape: see :meth:`MaterialPoints.thickened`."""
+        return ElasticBody(
+            self.mesh, self.material, self.mu_pa, self.lam_pa, modes=self.modes, points=points
         )
 
     def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
@@ -86,22 +95,31 @@ class ElasticBody:
         )
 
     def gradient_by(self, parameter: str, positions_m: Floats) -> Floats:
-        if parameter == _POISSON:
-            mu_by, lam_by = materials.lame_by_poisson(self.material, self.mu_pa, self.lam_pa)
-            # A step as large as the moduli, so that the difference below keeps its digits.
-            unit = float(np.mean(self.mu_pa + self.lam_pa) / np.mean(np.abs(mu_by) + lam_by))
-        elif parameter == _SCALE:
+        if parameter == _SCALE:
             return self.energy_and_gradient(positions_m)[1]
-        elif parameter in self.modes:
-            unit, field = 1.0, self.modes[parameter]
-            mu_by, lam_by = field * self.mu_pa, field * self.lam_pa
-        else:
-            raise unknown_parameter(self, parameter)
-        # All materials are linear in their two parameters, so a difference is the derivative.
-        _, more = self._energy_and_gradient(
-            positions_m, self.mu_pa + unit * mu_by, self.lam_pa + unit * lam_by
+        if parameter == _THICKNESS:
+            thicker, thinner = (
+                self.with_points(self.points.thickened(1 + step)).energy_and_gradient(positions_m)
+                for step in (_THICKNESS_STEP, -_THICKNESS_STEP)
+            )
+            return (thicker[1] - thinner[1]) / (2 * _THICKNESS_STEP)
+        mu_by, lam_by = self._lame_by(parameter)
+        # All materials are linear in their two parameters, so a difference is the derivative; one
+        # as large as the moduli keeps its digits.
+        step = float(np.mean(self.mu_pa + self.lam_pa))
+        step /= max(float(np.mean(np.abs(mu_by) + np.abs(lam_by))), 1e-12 * step)
+        _, there = self._energy_and_gradient(
+            positions_m, self.mu_pa + step * mu_by, self.lam_pa + step * lam_by
         )
-        return (more - self.energy_and_gradient(positions_m)[1]) / unit
+        return (there - self.energy_and_gradient(positions_m)[1]) / step
+
+    def _lame_by(self, parameter: str) -> tuple[Floats, Floats]:
+        """Derivatives (elements, points) of mu and lambda."""
+        if parameter == _POISSON:
+            return materials.lame_by_poisson(self.material, self.mu_pa, self.lam_pa)
+        if parameter in self.modes:
+            return self.modes[parameter] * self.mu_pa, self.modes[parameter] * self.lam_pa
+        raise unknown_parameter(self, parameter)
 
     def stress_pa(self, F: Floats) -> Floats:
         """First Piola stress of deformation gradients F (elements, points, 3, 3)."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -39,7 +38,7 @@ class Bed:
     def parameters(self) -> tuple[str, ...]:
         return ("height_m",)
 
-    @cached_property
+    @property
     def pairs(self) -> Integers:
         return diagonal_pairs(len(self.stiffness_n_per_m))
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,12 +21,14 @@ class MaterialPoints:
 
     ``values`` (points, nodes of an element) are shape functions, ``gradients`` (elements, points,
     3, nodes of an element) their rest gradients [1/m], ``volumes_m3`` (elements, points).
+    ``pairs`` (elements x width x width, 2) are all pairs of nodes of each element.
     """
 
     mesh: Mesh
     values: Floats
     gradients: Floats
     volumes_m3: Floats
+    pairs: Integers
 
     @staticmethod
     def of(mesh: Mesh, rule: Quadrature) -> MaterialPoints:
@@ -49,15 +50,18 @@ class MaterialPoints:
             shape_values(mesh.element, rule.points),
             np.ascontiguousarray(gradients),
             determinant * rule.weights,
+            _element_pairs(mesh.connectivity),
         )
 
-    @cached_property
-    def pairs(self) -> Integers:
-        """Every pair of nodes of every element (elements x width x width, 2)."""
-        connectivity = self.mesh.connectivity
-        width = connectivity.shape[1]
-        rows = np.repeat(connectivity, width, axis=1).ravel()
-        return np.column_stack([rows, np.tile(connectivity, (1, width)).ravel()])
+    def thickened(self, scale: float | Floats) -> MaterialPoints:
+        """The points of a rest shape ``scale`` times as thick along z, everywhere or at each point.
+
+        Where the rest shape lies does not matter to any material, only how it is shaped.
+        """
+        factor = np.broadcast_to(np.asarray(scale, dtype=float), self.volumes_m3.shape)
+        gradients = self.gradients.copy()
+        gradients[:, :, 2] /= factor[:, :, None]
+        return replace(self, gradients=gradients, volumes_m3=self.volumes_m3 * factor)
 
     def places(self, places: Places) -> Places:
         """The places of :attr:`pairs`, element by element (elements, width, width, 3)."""
@@ -92,19 +96,23 @@ class MaterialPoints:
         return shares
 
 
+def _element_pairs(connectivity: Integers) -> Integers:
+    width = connectivity.shape[1]
+    rows = np.repeat(connectivity, width, axis=1).ravel()
+    return np.column_stack([rows, np.tile(connectivity, (1, width)).ravel()])
+
+
 class MaterialTerm(ABC):
     """Base of an energy density of the deformation gradient, beside the base material.
 
     A term says what happens at points, all of them at once: F comes as (elements, points, 3, 3).
-    Its ``points`` are those of the body that it belongs to.
+    A subclass is a frozen dataclass with ``name`` and ``points``, those of the body that it belongs
+    to, among its fields.
     """
 
-    parameters: tuple[str, ...] = ()
+    name: str
     points: MaterialPoints
-
-    @property
-    @abstractmethod
-    def name(self) -> str: ...
+    parameters: tuple[str, ...] = ()
 
     @abstractmethod
     def density_and_stress(self, F: Floats) -> tuple[Floats, Floats]:

@@ -17,6 +17,7 @@ object, that costs nothing.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import cache
 from typing import Protocol
 
 import numpy as np
@@ -64,17 +65,14 @@ class Term(Protocol):
 
 
 class BoundaryTerm(ABC):
-    """Base of an energy of nodal positions: say which nodes it couples, and how."""
+    """Base of an energy of nodal positions: say which nodes it couples, and how.
 
+    A subclass is a frozen dataclass with ``name`` and ``pairs`` among its fields.
+    """
+
+    name: str
+    pairs: Integers
     parameters: tuple[str, ...] = ()
-
-    @property
-    @abstractmethod
-    def name(self) -> str: ...
-
-    @property
-    @abstractmethod
-    def pairs(self) -> Integers: ...
 
     @abstractmethod
     def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]: ...
@@ -97,6 +95,9 @@ def unknown_parameter(term: Term, parameter: str) -> ValueError:
     return ValueError(f"term {term.name!r} has no parameter {parameter!r}; it has: {known}")
 
 
+@cache
 def diagonal_pairs(nodes: int) -> Integers:
-    """Pairs (nodes, 2) of every node with itself."""
-    return np.repeat(np.arange(nodes, dtype=np.int64)[:, None], 2, axis=1)
+    """Pairs (nodes, 2) of every node with itself: one array for all terms on as many nodes."""
+    pairs = np.repeat(np.arange(nodes, dtype=np.int64)[:, None], 2, axis=1)
+    pairs.flags.writeable = False
+    return pairs

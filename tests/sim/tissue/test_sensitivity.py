@@ -106,6 +106,15 @@ def with_mode(tissue: TissueModel, strength: float) -> TissueState:
     return state
 
 
+def with_thickness(tissue: TissueModel, change: float) -> TissueState:
+    body = tissue.terms["material"]
+    assert isinstance(body, ElasticBody)
+    tissue.set_term(body.with_points(body.points.thickened(1 + change)))
+    state = tissue.solve(RAISED)
+    tissue.set_term(body)
+    return state
+
+
 def with_gravity(tissue: TissueModel, change: float) -> TissueState:
     load = tissue.terms["gravity"]
     assert isinstance(load, DeadLoad)
@@ -149,6 +158,7 @@ CASES: dict[str, tuple[Parameter, float, Callable[[TissueModel, float], TissueSt
     "modulus": (YOUNG_MODULUS_SCALE, 1e-4, lambda tissue, d: with_modulus(tissue, 1 + d)),
     "poisson": (POISSON_RATIO, 1e-4, with_poisson),
     "mode": (TermParameter("material", MODE), 1e-4, with_mode),
+    "thickness": (TermParameter("material", "thickness_scale"), 1e-4, with_thickness),
     "gravity": (GRAVITY_M_S2, 1e-3, with_gravity),
     "bed": (TermParameter("bed", "height_m"), 1e-7, with_bed),
     "soft hole": (HoleStiffness(SOFT_HOLE), 0.05, with_hole(SOFT_HOLE)),
