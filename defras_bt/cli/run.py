@@ -15,6 +15,7 @@ from defras_bt.cli.errors import OUTCOME_CODES, UserError
 from defras_bt.cli.files import find, find_scene, folder_for
 from defras_bt.cli.plan import rehearsed, tell
 from defras_bt.executive.operation import WORLDS, Operation, operate
+from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, read_substitutes
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.planning.english import plan_text
 from defras_bt.planning.plan import Plan
@@ -41,6 +42,10 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Folder for what the run leaves.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same run (model world).")] = 0,
     max_time: Annotated[float, typer.Option(min=1, help="Longest world time in s.")] = 300.0,
+    substitute: Annotated[
+        Path | None,
+        typer.Option(help="File that replaces nodes by scripts, to try out what would happen."),
+    ] = None,
     approve: Annotated[bool, typer.Option("--approve", help="Ask before each plan.")] = False,
 ) -> None:
     """Retract the tissue until the region of interest is visible.
@@ -56,12 +61,15 @@ def run(
     actual_file, truth = find_scene(actual) if actual is not None else (None, believed)
     _require_same_set_up(believed, truth)
     tree_file = find(tree, "trees")
+    tree_spec = read_tree(tree_file)
+    substitutes = NOTHING_SUBSTITUTED if substitute is None else read_substitutes(substitute)
+    substituted = substitutes.paths(tree_spec)
     recorded = file_recorders(out) if out is not None else ()
     console = Console(soft_wrap=True, highlight=False)
     prepared = rehearsed(
         believed.for_bullet() if world == "bullet" else believed,
         console,
-        with_plan=needs_plan(read_tree(tree_file)),
+        with_plan=needs_plan(tree_spec),
         plan_file=plan,
     )
     if prepared.result is not None:
@@ -77,7 +85,14 @@ def run(
         force_threshold_n=prepared.force_threshold_n,
         preoperative=prepared.plan,
         max_time_s=max_time,
+        substitutes=substitutes,
     )
+    if substituted:
+        console.print(
+            f"A TRIAL, NOT AN OPERATION: {len(substituted)} of the tree's nodes are replaced by "
+            f"scripts ({substitute}).",
+            style="bold yellow",
+        )
     recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console), *recorded]
     asked: Callable[[Plan], bool] = _ask if approve else lambda plan: True
     with stop_on_interrupt() as operator_stop:

@@ -15,9 +15,11 @@ from defras_bt.executive.blackboard import Blackboard, TickInputs
 from defras_bt.executive.context import Context
 from defras_bt.executive.deadline import Deadline
 from defras_bt.executive.gate import CommandGate, GateVerdict, Proposal
-from defras_bt.executive.loader import LoadedTree, load_tree
+from defras_bt.executive.loader import LoadedTree, build_tree
 from defras_bt.executive.perception import Perception
 from defras_bt.executive.statuses import TickedVisitor
+from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
+from defras_bt.executive.tree_file import read_tree
 from defras_bt.recording.record import Event, Recorder, TickRecord
 from defras_sim.worlds.protocol import HOLD, Command, World
 
@@ -45,6 +47,7 @@ class Executive:
         recorder: Recorder,
         max_time_s: float,
         deadline: Deadline = nullcontext,
+        substitutes: Substitutes = NOTHING_SUBSTITUTED,
     ) -> None:
         self._context = context
         self._board: Blackboard = context.board
@@ -53,7 +56,10 @@ class Executive:
         self._recorder = recorder
         self._max_time_s = max_time_s
         self._deadline = deadline
-        self.tree: LoadedTree = load_tree(tree_file, context)
+        self._substitutes = substitutes
+        spec = read_tree(tree_file)
+        self.substituted = substitutes.paths(spec)
+        self.tree: LoadedTree = substitutes.into_tree(build_tree(spec, context), context)
         self._board.metric = self.tree.metric
         self._bt = py_trees.trees.BehaviourTree(self.tree.root)
         self._ticked = TickedVisitor(self._board, self.tree)
@@ -104,6 +110,8 @@ class Executive:
         board = self._board
         inputs = self._perception.update(self._tick, self._world.observe())
         board.begin_tick(inputs)
+        if self._tick == 0 and self.substituted:
+            self._tell_substituted()
         self._tell_changes(inputs)
         with self._deadline():
             self._bt.tick()
@@ -127,8 +135,18 @@ class Executive:
             return
         if slot is None:
             raise ValueError(f"tree {self.tree.name} makes plans but has no plan_slot")
-        slot.fill(action_leaves(board.new_plan, self._context))
+        leaves = action_leaves(board.new_plan, self._context)
+        slot.fill(self._substitutes.into_plan(slot, self.tree.root, leaves, self._context))
         board.plan, board.new_plan = board.new_plan, None
+
+    def _tell_substituted(self) -> None:
+        """Nobody may take a trial for an operation."""
+        self._board.tell(
+            "start",
+            "This is a trial: these nodes do not act but say what a script tells them: "
+            f"{', '.join(self.substituted)}.",
+            "warning",
+        )
 
     def _tell_changes(self, inputs: TickInputs) -> None:
         """Say when the warning state or the force rose."""

@@ -13,6 +13,7 @@ from defras_bt.executive.blackboard import Blackboard, TickInputs
 from defras_bt.executive.context import Context
 from defras_bt.executive.executive import Executive
 from defras_bt.executive.perception import Perception
+from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
 from defras_bt.learning.buffer import KeyframeBuffer
 from defras_bt.learning.inverse import InverseEstimator
 from defras_bt.monitoring.warning import WarningMonitor
@@ -28,12 +29,16 @@ from defras_sim.twin import Twin
 from defras_sim.worlds.model_world import ModelWorld
 from defras_sim.worlds.protocol import World
 
-WORLDS = ("model", "bullet")
+SIMULATED_WORLDS = ("model", "bullet")
+WORLDS = SIMULATED_WORLDS
 
 
 @dataclass(frozen=True)
 class Operation:
-    """What to run. ``scene`` is believed, ``actual`` is there; the files are for the record."""
+    """What to run. ``scene`` is believed, ``actual`` is there; the files are for the record.
+
+    ``substitutes`` replace nodes of the tree, for trials in simulated worlds.
+    """
 
     scene: Scene
     actual: Scene
@@ -45,6 +50,7 @@ class Operation:
     force_threshold_n: float
     preoperative: Plan | None = None
     max_time_s: float = 300.0
+    substitutes: Substitutes = NOTHING_SUBSTITUTED
 
 
 class TwinRehearsal:
@@ -71,9 +77,12 @@ def operate(
     """Run the operation to its outcome; every recorder is finished whatever happens.
 
     Raises:
+        ValueError: nodes are substituted in a world that is not simulated.
         ExecutiveFailed: something broke; the recorders were finished first.
         RecordingFailed: the run ended, but a recorder could not keep up.
     """
+    if operation.substitutes.entries and operation.world not in SIMULATED_WORLDS:
+        raise ValueError(f"nodes can be substituted in {', '.join(SIMULATED_WORLDS)} only")
     started = perf_counter()
     world_rng, learning_rng = np.random.default_rng(operation.seed).spawn(2)
     believed = operation.scene.for_bullet() if operation.world == "bullet" else operation.scene
@@ -101,7 +110,13 @@ def operate(
             board, twin, monitor, keyframes, operation.force_threshold_n, operator_stop
         )
         executive = Executive(
-            operation.tree_file, context, world, perception, recorder, operation.max_time_s
+            operation.tree_file,
+            context,
+            world,
+            perception,
+            recorder,
+            operation.max_time_s,
+            substitutes=operation.substitutes,
         )
         recorder.start(_info(operation, executive, believed))
         try:
@@ -158,4 +173,5 @@ def _info(operation: Operation, executive: Executive, believed: Scene) -> RunInf
         tree_paths=executive.tree.kinds(),
         versions=versions(),
         believed=believed.attached,
+        substituted=executive.substituted,
     )

@@ -8,6 +8,7 @@ from py_trees.common import Status
 from pydantic import Field, model_validator
 
 from defras_bt.executive.node import Node, NodeParameters, Role
+from defras_bt.executive.reasons import Code
 
 StatusName = Literal["SUCCESS", "FAILURE", "RUNNING"]
 _CODE = r"^[a-z][a-z0-9_]*$"
@@ -97,5 +98,7 @@ class ScriptedLeaf(Node):
         return self.parameters.steps[-1]
 
     def _say(self, status: StatusName, code: str, message: str) -> Status:
+        # A word of the project's own codes keeps its remedies, so that recoveries answer to it.
+        known = next((own for own in Code if own == code), code)
         report = {"SUCCESS": self.succeed, "FAILURE": self.fail, "RUNNING": self.run}[status]
-        return report(code, message)
+        return report(known, message)

@@ -137,6 +137,9 @@ class Substitutes:
         return node
 
 
+NOTHING_SUBSTITUTED = Substitutes()
+
+
 def read_substitutes(file: Path) -> Substitutes:
     """Read a file of substitutes; whether they suit a tree is asked with :meth:`paths`.
 

@@ -100,6 +100,7 @@ class RunInfo:
 
     ``tree_paths`` lists (path, kind) of every node at the start. ``actual`` is None where nobody
     knows it. ``metric`` is None for a tree without monitoring. ``versions``: package to version.
+    ``substituted`` lists the paths of nodes that only say what a script tells them.
     """
 
     scene: Scene
@@ -114,6 +115,7 @@ class RunInfo:
     tree_paths: tuple[tuple[str, str], ...]
     versions: Mapping[str, str]
     believed: NDArray[np.bool_]
+    substituted: tuple[str, ...] = ()
 
     def warning_state(self, reading: MonitorReading | None) -> int | None:
         """The state that the run's tree listens to; None if it has none, or nothing was read."""

@@ -58,6 +58,9 @@ class RunFile(BaseModel):
     world: str
     tree: str
     versions: dict[str, str]
+    substituted: list[str] = Field(
+        default=[], description="paths of nodes replaced by scripts; the run was a trial"
+    )
 
 
 def run_schema() -> dict[str, Any]:

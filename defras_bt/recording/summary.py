@@ -72,6 +72,7 @@ class SummaryRecorder:
                 "world": info.world,
                 "tree": info.tree,
                 "versions": dict(info.versions),
+                "substituted": list(info.substituted),
             }
         )
         return RunSummary(file.model_dump(by_alias=True))

@@ -11,6 +11,7 @@ import numpy as np
 from defras_bt.executive.deadline import Deadline
 from defras_bt.executive.executive import Executive
 from defras_bt.executive.perception import Perception
+from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
 from defras_bt.recording.composite import CompositeRecorder
 from defras_bt.recording.record import Recorder, RunInfo, RunSummary, TickRecord
 from defras_sim.resources import resource
@@ -52,6 +53,7 @@ class Stage:
         max_time_s: float = 120.0,
         beside: Sequence[Recorder] = (),
         deadline: Deadline = nullcontext,
+        substitutes: Substitutes = NOTHING_SUBSTITUTED,
     ) -> None:
         self.bench = bench if bench is not None else Bench()
         self.operator_stop: str | None = None
@@ -68,7 +70,14 @@ class Stage:
         )
         file = tree if isinstance(tree, Path) else resource(f"trees/{tree}.yaml")
         self.executive = Executive(
-            file, bench.context, bench.world, perception, self.recorder, max_time_s, deadline
+            file,
+            bench.context,
+            bench.world,
+            perception,
+            self.recorder,
+            max_time_s,
+            deadline,
+            substitutes,
         )
 
     @property

@@ -7,6 +7,7 @@ import pytest
 from py_trees.common import Status
 from pydantic import ValidationError
 
+from defras_bt.executive.reasons import Code, Remedy, helps
 from defras_bt.executive.scripted import Script, ScriptedLeaf, ScriptStep
 from tests.nodes.bench import Bench
 
@@ -53,6 +54,13 @@ def test_a_delay_is_world_time_and_begins_again_with_every_activity():
     assert until_done() == pytest.approx(0.3)
     inputs.time_s = 17.0
     assert until_done() == pytest.approx(0.3)
+
+
+def test_a_code_of_the_project_keeps_its_remedies():
+    node = leaf(Script(status="FAILURE", code="planner_timed_out"))
+    node.tick_once()
+    assert node.code is Code.PLANNER_TIMED_OUT
+    assert not helps(Remedy.REPLAN, node.code)
 
 
 def test_the_blackboard_stays_as_it_is():

@@ -15,6 +15,7 @@ from defras_bt.executive.substitution import Substitutes, read_substitutes, subs
 from defras_bt.executive.tree_file import read_tree
 from defras_sim.resources import resource
 from defras_sim.yaml_source import InvalidFile
+from tests.executive.stage import Stage, doing, jaws, still
 from tests.nodes.bench import Bench
 from tests.nodes.bench_services import plan_of
 
@@ -131,6 +132,39 @@ class TestPlans:
         assert [type(leaf) is ScriptedLeaf for leaf in put] == [True, False, False]
         assert [leaf.name for leaf in put] == [leaf.name for leaf in leaves]
         assert put[1:] == leaves[1:]
+
+
+class TestRuns:
+    def test_a_substituted_motion_moves_nothing_and_everybody_is_told(self, substitutes):
+        told = substitutes("  - {path: '**/act/*_pull_*', status: SUCCESS, after_s: 0.5}\n")
+        stage = Stage("fras", substitutes=told)
+        stage.until("the grasp is done", lambda r: doing(r) == "pull")
+        pulling = stage.ticks(0.4)
+        assert {doing(record) for record in pulling} == {"pull"}
+        assert all(still(record) and not jaws(record) for record in pulling)
+        stage.until_doing("fold")
+        assert stage.notes.records[0].events[0].level == "warning"
+        (sentence,) = stage.notes.told("start")[:1]
+        assert "This is a trial" in sentence
+        assert "**/act/*_pull_*" in sentence
+        assert stage.executive.substituted == ("**/act/*_pull_*",)
+
+    def test_a_guard_that_always_succeeds_does_not_fool_the_gate(self, substitutes):
+        told = substitutes(
+            "  - {path: '**/force_accepted', status: SUCCESS}\n"
+            "  - {path: '**/sensors_fresh', status: SUCCESS}\n"
+        )
+        stage = Stage("fras", substitutes=told)
+        stage.until_doing("pull")
+        stage.bench.twin.feels_n = float("nan")
+        blind = stage.ticks(0.3)
+        assert doing(blind[-1]) == "pull", "the tree goes on"
+        assert all(still(record) for record in blind), "the gate does not"
+
+    def test_without_substitutes_nothing_is_told(self):
+        stage = Stage("fras")
+        stage.tick()
+        assert not any("trial" in sentence for sentence in stage.notes.told("start"))
 
 
 class TestFaults:

@@ -36,6 +36,7 @@ PROMISED = {
     "world",
     "tree",
     "versions",
+    "substituted",
 }
 
 
