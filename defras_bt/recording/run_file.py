@@ -59,7 +59,7 @@ class RunFile(BaseModel):
     tree: str
     versions: dict[str, str]
     substituted: list[str] = Field(
-        default=[], description="paths of nodes replaced by scripts; the run was a trial"
+        description="paths of nodes replaced by scripts; the run was a trial"
     )
 
 
