@@ -9,12 +9,15 @@ from defras_bt.executive.tree_spec import NodeSpec
 from defras_sim.yaml_source import Fault
 
 
-def check_tree(root: NodeSpec, guard_names: Collection[str]) -> Iterator[Fault]:
+def check_tree(
+    root: NodeSpec, guard_names: Collection[str], *, must_be_guarded: bool = True
+) -> Iterator[Fault]:
     """Faults of a tree whose nodes are each well-formed.
 
     ``guard_names``: classes that could be put before an unguarded motion, for the message.
     """
-    yield from _unguarded(root, False, guard_names)
+    if must_be_guarded:
+        yield from _unguarded(root, False, guard_names)
     slots = [(path, spec) for path, spec in root.walk() if spec.kind == "plan_slot"]
     for path, spec in slots[1:]:
         yield Fault(

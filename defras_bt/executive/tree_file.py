@@ -63,8 +63,11 @@ class SubtreeOptions(NodeParameters):
     )
 
 
-def read_tree(file: Path, registry: Registry = NODES) -> TreeSpec:
+def read_tree(file: Path, registry: Registry = NODES, *, must_be_guarded: bool = True) -> TreeSpec:
     """Read a tree file and everything it includes.
+
+    ``must_be_guarded``: whether a motion without a guard before it is a fault. It is one wherever a
+    tree may be carried out; only to look at it, or to prove what it lacks, an unsafe one will do.
 
     Raises:
         InvalidFile: with everything that is wrong with any of the files. Whether motion is guarded
@@ -75,7 +78,7 @@ def read_tree(file: Path, registry: Registry = NODES) -> TreeSpec:
     tree = _Reader(source, faults, registry=registry, including=(file.resolve(),)).tree()
     if tree is not None and not faults:
         guard_names = [name for name, node in registry.nodes().items() if node.role == "guard"]
-        faults.extend(check_tree(tree.root, guard_names))
+        faults.extend(check_tree(tree.root, guard_names, must_be_guarded=must_be_guarded))
     if tree is None or faults:
         unique = dict.fromkeys(faults)  # a file included twice has its faults once
         raise InvalidFile(sorted(unique, key=lambda f: (f.file != file, f.file, f.line, f.column)))
