@@ -88,5 +88,5 @@ class LetGo(RecoveryLeaf):
         arms = " and ".join(arm.upper() for arm in board.grips)
         why = f"{arms} should let go of the tissue but did not open within {JAW_TIME_OUT_S:g} s"
         board.tell("human", f"Motion stopped, a human is asked to take over: {why}.", "error")
-        board.end("human", why)
+        board.end("human", why, Code.JAW_STUCK)
         return self.fail(Code.JAW_STUCK, why)

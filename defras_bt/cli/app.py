@@ -8,7 +8,7 @@ import sys
 import typer
 from rich.console import Console
 
-from defras_bt.cli import benchmark, doctor, plan, run, scene, tree, view
+from defras_bt.cli import benchmark, doctor, explain, plan, run, scene, tree, view
 from defras_bt.cli.errors import ExitCode, UserError
 from defras_bt.executive.executive import ExecutiveFailed
 from defras_bt.recording.composite import RecordingFailed
@@ -23,6 +23,7 @@ app = typer.Typer(
 )
 app.command("run")(run.run)
 app.command("plan")(plan.plan)
+app.command("explain")(explain.explain)
 app.command("view")(view.view)
 app.command("doctor")(doctor.doctor)
 app.add_typer(scene.app, name="scene")

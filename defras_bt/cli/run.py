@@ -21,6 +21,7 @@ from defras_bt.planning.english import plan_text
 from defras_bt.planning.plan import Plan
 from defras_bt.planning.preparation import needs_plan
 from defras_bt.recording.bag import BagRecorder
+from defras_bt.recording.decisions import DECISIONS_FILE, DecisionRecorder
 from defras_bt.recording.progress import EventPrinter, ProgressLine
 from defras_bt.recording.record import Recorder
 from defras_bt.recording.report import ReportRecorder
@@ -50,8 +51,8 @@ def run(
 ) -> None:
     """Retract the tissue until the region of interest is visible.
 
-    Leaves run.rrd, recording.mcap, run.json and report.html in --out. Exit code: 0 goal reached,
-    2 invalid input, 3 goal not reached, 4 a human was asked, 1 internal error.
+    Leaves run.rrd, recording.mcap, decisions.jsonl, run.json and report.html in --out. Exit code:
+    0 goal reached, 2 invalid input, 3 goal not reached, 4 a human was asked, 1 internal error.
 
     Example: defras run demo --actual demo_actual --world bullet --out out/demo
     """
@@ -98,7 +99,9 @@ def run(
     with stop_on_interrupt() as operator_stop:
         summary = operate(operation, recorders, approve=asked, operator_stop=operator_stop)
     if out is not None:
-        console.print(f"Written to {out}: run.rrd, recording.mcap, run.json, report.html")
+        console.print(
+            f"Written to {out}: run.rrd, recording.mcap, decisions.jsonl, run.json, report.html"
+        )
     raise typer.Exit(OUTCOME_CODES[str(summary.values["outcome"])])
 
 
@@ -112,6 +115,7 @@ def file_recorders(out: Path) -> list[Recorder]:
     return [
         TimelineRecorder(out / "run.rrd"),
         BagRecorder(out / "recording.mcap"),
+        DecisionRecorder(out / DECISIONS_FILE),
         SummaryRecorder(out / "run.json"),
         ReportRecorder(out / "report.html"),
     ]

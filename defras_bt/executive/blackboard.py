@@ -99,7 +99,7 @@ class Blackboard:
     unexplained: bool = False
     operator_refused: str | None = None
     outcome: Outcome | None = None
-    outcome_reason: str = ""
+    outcome_cause: Cause | None = None
 
     def begin_tick(self, inputs: TickInputs) -> None:
         """Forget the last tick's decisions; keep what lasts."""
@@ -119,11 +119,16 @@ class Blackboard:
         """Log one sentence that a surgeon understands."""
         self.events.append(Event(self.inputs.time_s, kind, level, sentence, dict(data or {})))
 
-    def end(self, outcome: Outcome, reason: str) -> None:
+    def end(self, outcome: Outcome, reason: str, code: str) -> None:
         """Decide the run's outcome; the first decision stands."""
         if self.outcome is None:
             self.outcome = outcome
-            self.outcome_reason = reason
+            self.outcome_cause = Cause(code, reason)
+
+    @property
+    def outcome_reason(self) -> str:
+        """Why the run ended, in words; "" while it goes on."""
+        return self.outcome_cause.message if self.outcome_cause is not None else ""
 
     @property
     def visible_share(self) -> float | None:

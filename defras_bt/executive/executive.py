@@ -17,9 +17,11 @@ from defras_bt.executive.deadline import Deadline
 from defras_bt.executive.gate import CommandGate, GateVerdict, Proposal
 from defras_bt.executive.loader import LoadedTree, build_tree
 from defras_bt.executive.perception import Perception
+from defras_bt.executive.reasons import Code
 from defras_bt.executive.statuses import TickedVisitor
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
 from defras_bt.executive.tree_file import read_tree
+from defras_bt.executive.why import WhyTeller
 from defras_bt.recording.record import Event, Recorder, TickRecord
 from defras_sim.worlds.protocol import HOLD, Command, World
 
@@ -67,6 +69,7 @@ class Executive:
         self._actions = ActionVisitor()
         self._bt.add_visitor(self._actions)
         self._gate = CommandGate(context.scene, self.tree.metric)
+        self._why = WhyTeller()
         self._tick = 0
         self._state_before = 0
         self._over_before = False
@@ -98,10 +101,10 @@ class Executive:
         try:
             self._world.command(HOLD)
         except Exception as error:
-            self._board.end("error", str(failure))
+            self._board.end("error", str(failure), Code.INTERNAL_ERROR)
             self._record_failure(f"The world did not take the order to stop ({error}): {failure}")
             raise failure from error
-        self._board.end("error", str(failure))
+        self._board.end("error", str(failure), Code.INTERNAL_ERROR)
         self._record_failure(
             f"Motion stopped, the grip is kept, a human is asked to take over: {failure}"
         )
@@ -117,7 +120,8 @@ class Executive:
             self._bt.tick()
         if inputs.time_s >= self._max_time_s and board.outcome is None:
             board.tell("end", f"Stopped after {inputs.time_s:.0f} s without the goal.", "error")
-            board.end("not_reached", f"time is over after {inputs.time_s:.0f} s")
+            why = f"time is over after {inputs.time_s:.0f} s"
+            board.end("not_reached", why, Code.TIME_OVER)
         proposal = Proposal(board.command, board.rate, self._actions.acting, self._world.time_s)
         verdict = self._gate.check(proposal, inputs)
         self._tell_stopped(verdict)
@@ -194,12 +198,16 @@ class Executive:
             why = f"motion was refused for {REFUSED_PATIENCE_S:g} s: {'; '.join(stopped)}"
             sentence = f"Motion stopped, a human is asked to take over: {why}."
             self._board.tell("human", sentence, "error")
-            self._board.end("human", why)
+            self._board.end("human", why, Code.MOTION_REFUSED)
 
     def _record(self, inputs: TickInputs, sent: Command) -> None:
         true_force_n, true_surface = self._world.true_force_n(), self._world.true_surface()
         known = self._known(inputs, sent)
-        self._last = replace(known, true_force_n=true_force_n, true_surface=true_surface)
+        why = self._why.event(known, self.tree.kinds)
+        events = known.events if why is None else (*known.events, why)
+        self._last = replace(
+            known, true_force_n=true_force_n, true_surface=true_surface, events=events
+        )
         self._recorder.tick(self._last)
 
     def _known(self, inputs: TickInputs, sent: Command) -> TickRecord:
@@ -226,6 +234,7 @@ class Executive:
             node_decider=snapshot.decider,
             cause=snapshot.cause,
             stopped_by=snapshot.stopped_by,
+            ended=board.outcome_cause,
             plan=board.plan,
             plan_step=slot.step if slot is not None else None,
             events=tuple(board.events),
@@ -237,4 +246,14 @@ class Executive:
         last = self._last or self._known(board.inputs, HOLD)
         untold = board.events if board.inputs.tick > last.tick else ()
         event = Event(last.time_s, "error", "error", sentence)
-        self._recorder.tick(replace(last, tick=last.tick + 1, sent=HOLD, events=(*untold, event)))
+        ended = board.outcome_cause
+        self._recorder.tick(
+            replace(
+                last,
+                tick=last.tick + 1,
+                sent=HOLD,
+                events=(*untold, event),
+                cause=ended,
+                ended=ended,
+            )
+        )

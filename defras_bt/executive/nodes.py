@@ -10,6 +10,7 @@ from pydantic import Field
 from defras_bt.executive.node import Node, NodeParameters, Role
 from defras_bt.executive.reasons import Code, Remedy, helps
 from defras_bt.executive.registry import register_node
+from defras_bt.recording.record import Cause
 
 
 class RateParameters(NodeParameters):
@@ -45,7 +46,7 @@ class AdaptRate(Task):
         if board.inputs.force_n > board.inputs.force_threshold_n:
             reasons.append(f"{board.inputs.force_n:.2f} N")
         if not reasons:
-            return self.succeed(Code.NOMINAL, "full speed")
+            return self.succeed(Code.NOMINAL, "motion at full speed")
         board.rate = self.parameters.slow
         return self.succeed(Code.SLOWED, f"slowed to {board.rate:.0%}: {', '.join(reasons)}")
 
@@ -91,11 +92,12 @@ class Finish(Task):
         if seen is None or seen < wanted:
             share = "unknown" if seen is None else f"{seen:.0%}"
             return self.fail(
-                Code.HIDDEN, f"not at the goal: {share} of the region is visible of {wanted:.0%}"
+                Code.HIDDEN,
+                f"not at the goal: {share} of the region is visible of {wanted:.0%} wanted",
             )
         sentence = f"{seen:.0%} of the region of interest is visible: the goal is reached."
         board.tell("goal", sentence)
-        board.end("goal", sentence)
+        board.end("goal", sentence, Code.GOAL)
         return self.succeed(Code.GOAL, sentence)
 
 
@@ -104,23 +106,28 @@ class AskHuman(Task):
     """Stop, keep the grip, and ask a human to take over."""
 
     def update(self) -> Status:
-        board = self.context.board
-        why = self._why()
-        board.tell("human", f"Motion stopped, a human is asked to take over: {why}.", "error")
-        board.end("human", why)
-        return self.succeed(Code.ASKED, why)
+        board, why = self.context.board, self._why()
+        sentence = f"Motion stopped, a human is asked to take over: {why.message}."
+        board.tell("human", sentence, "error")
+        board.end("human", why.message, why.code)
+        return self.succeed(Code.ASKED, why.message)
 
-    def _why(self) -> str:
+    def _why(self) -> Cause:
         board = self.context.board
-        if board.inputs.operator_stop or board.operator_refused:
-            return board.inputs.operator_stop or str(board.operator_refused)
+        if board.inputs.operator_stop:
+            return Cause(Code.STOPPED, board.inputs.operator_stop)
+        if board.operator_refused:
+            return Cause(Code.PLAN_REFUSED, board.operator_refused)
         if board.inputs.missing:
-            return "; ".join(board.inputs.missing)
+            return Cause(Code.STALE, "; ".join(board.inputs.missing))
         if (board.warning_state or 0) >= 2:
-            return f"the tissue is {board.mu_m * 1e3:.1f} mm away from where the model expects it"
+            off_mm = board.mu_m * 1e3
+            why = f"the tissue is {off_mm:.1f} mm away from where the model expects it"
+            return Cause(Code.WARNED, why)
+        dead_end = "no safe way to go on was found"
         if board.failure is not None:
-            return f"no safe way to go on was found: {board.failure.message}"
-        return "no safe way to go on was found"
+            return Cause(board.failure.code, f"{dead_end}: {board.failure.message}")
+        return Cause(Code.ASKED, dead_end)
 
 
 @register_node
@@ -148,5 +155,5 @@ class GiveUp(Task):
         board = self.context.board
         why = board.no_plan or "no plan leads to the goal any more"
         board.tell("end", f"The goal was not reached: {why}", "error")
-        board.end("not_reached", why)
+        board.end("not_reached", why, Code.IMPOSSIBLE if board.no_plan else Code.GAVE_UP)
         return self.succeed(Code.GAVE_UP, why)

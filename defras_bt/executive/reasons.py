@@ -147,6 +147,9 @@ class Code(ReasonCode):
     WOULD_NOT_HELP = "would_not_help", "not tried: it does not help against what failed"
     HUMAN_HELPS = "human_helps", "a human can help with what failed"
     ASKED = "asked", "the operation ended with a call for a human"
+    TIME_OVER = "time_over", "the longest time given to the operation is over"
+    MOTION_REFUSED = "motion_refused", "the command gate refused motion for too long", "human"
+    INTERNAL_ERROR = "internal_error", "the program broke", "human"
     GAVE_UP = "gave_up", "the operation ended without its goal"
 
 

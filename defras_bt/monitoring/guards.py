@@ -73,8 +73,8 @@ class WarningBelow(Guard):
         if state is None:
             return self.fail(Code.WARNING_UNKNOWN, "the warning state is unknown")
         if state >= self.parameters.state:
-            return self.fail(Code.WARNED, f"warning state {state}")
-        return self.succeed(Code.BELOW, f"warning state {state}")
+            return self.fail(Code.WARNED, f"the warning state is {state}")
+        return self.succeed(Code.BELOW, f"the warning state is {state}")
 
 
 @register_node
@@ -87,8 +87,10 @@ class WarningReached(Guard):
     def update(self) -> Status:
         state = self.context.board.warning_state
         if state is None or state < self.parameters.state:
-            return self.fail(Code.BELOW, f"warning state {'unknown' if state is None else state}")
-        return self.succeed(Code.REACHED, f"warning state {state}")
+            return self.fail(
+                Code.BELOW, f"the warning state is {'unknown' if state is None else state}"
+            )
+        return self.succeed(Code.REACHED, f"the warning state is {state}")
 
 
 @register_node
@@ -106,9 +108,12 @@ class ForceAccepted(Guard):
         if board.force_over_s >= self.parameters.patience_s:
             return self.fail(
                 Code.FORCE_TOO_HIGH,
-                f"{force_n:.2f} N, over {limit_n:.2f} N for {board.force_over_s:.2f} s",
+                f"the force is {force_n:.2f} N, over its threshold of {limit_n:.2f} N "
+                f"for {board.force_over_s:.2f} s",
             )
-        return self.succeed(Code.ACCEPTED, f"{force_n:.2f} N of {limit_n:.2f} N")
+        return self.succeed(
+            Code.ACCEPTED, f"the force is {force_n:.2f} N of at most {limit_n:.2f} N"
+        )
 
 
 @register_node
@@ -120,8 +125,10 @@ class RegionVisible(Guard):
         wanted = self.context.scene.thresholds.roi_visibility
         if seen is None or seen < wanted:
             share = "unknown" if seen is None else f"{seen:.0%}"
-            return self.fail(Code.HIDDEN, f"visible: {share}, wanted: {wanted:.0%}")
-        return self.succeed(Code.VISIBLE, f"visible: {seen:.0%}")
+            return self.fail(
+                Code.HIDDEN, f"{share} of the region is visible of {wanted:.0%} wanted"
+            )
+        return self.succeed(Code.VISIBLE, f"{seen:.0%} of the region is visible")
 
 
 @register_node
@@ -130,8 +137,8 @@ class RestCalibrated(Guard):
 
     def update(self) -> Status:
         if self.context.board.rest_calibrated:
-            return self.succeed(Code.CALIBRATED, "rest frames are known")
-        return self.fail(Code.NOT_CALIBRATED, "rest frames are still to be seen")
+            return self.succeed(Code.CALIBRATED, "monitoring knows the untouched tissue")
+        return self.fail(Code.NOT_CALIBRATED, "monitoring does not know the untouched tissue yet")
 
 
 @register_node

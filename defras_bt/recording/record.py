@@ -23,10 +23,12 @@ Level = Literal["info", "warning", "error"]
 class Event:
     """Something worth telling: a sentence that a surgeon understands, and a kind for counting.
 
-    Kinds: start, plan, action, warning, force, learning, replan, goal, human, error, hold, end.
+    Kinds: start, plan, action, warning, force, learning, replan, operator, why, goal, human,
+    error, hold, end.
     One event of kind ``action`` is one action finished, of kind ``replan`` one new plan asked for,
     of kind ``learning`` one attachment update tried. ``data`` holds what a program counts or
-    draws: ``learning`` says ``{"adopted": bool}``.
+    draws: ``learning`` says ``{"adopted": bool}``, ``why`` ``{"chain": [sentence, ...]}``:
+    how the tree came to its decision, node by node.
     """
 
     time_s: float
@@ -58,7 +60,9 @@ class TickRecord:
     ``node_message`` to its last word, ``node_code`` to the code of it, ``node_last_status`` to the
     last status it had, and ``node_decider`` to the child that decided it. ``cause`` is the leaf
     that decided the whole tree; ``stopped_by`` the one because of which no plan is carried out,
-    None while one is, or where nobody asked. ``sent`` left the gate; ``proposed`` came from the
+    None while one is, or where nobody asked. ``ended`` is why the run ended with this tick, None
+    while it goes on. ``operator`` is "autonomous", "paused", "taken_over" or
+    "stopped". ``sent`` left the gate; ``proposed`` came from the
     tree. ``believed`` (holes,) marks the attachments believed now. ``plan`` is the latest plan,
     ``plan_step`` the 0-based index of the action in it that is carried out, None while none is.
     """
@@ -85,6 +89,8 @@ class TickRecord:
     node_decider: Mapping[str, str] = field(default_factory=dict)
     cause: Cause | None = None
     stopped_by: Cause | None = None
+    ended: Cause | None = None
+    operator: str = "autonomous"
 
     @property
     def action(self) -> Action | None:

@@ -13,6 +13,8 @@ from markupsafe import Markup
 
 from defras_bt.planning.english import action_sentence
 from defras_bt.recording import palette
+from defras_bt.recording.explain import Explanation, explain
+from defras_bt.recording.moment import moment_of
 from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
 from defras_bt.recording.report_plots import (
     attachments_svg,
@@ -85,6 +87,7 @@ def report_html(log: RunLog, summary: RunSummary) -> str:
         values=values,
         tiles=_tiles(values),
         events=log.events,
+        why=_why(log),
         signals=Markup(signals_svg(log)) if log.first is not None else None,
         panels=_panels(log),
         attachments=_attachments(log) if log.first is not None else None,
@@ -100,6 +103,13 @@ def report_html(log: RunLog, summary: RunSummary) -> str:
         nodes=_nodes(log),
         colours={name: palette.css(colour) for name, colour in palette.NODE_STATES.items()},
     )
+
+
+def _why(log: RunLog) -> Explanation | None:
+    """Why the run ended as it did; None where it broke off before its first tick."""
+    if log.last is None:
+        return None
+    return explain(moment_of(log.last, dict(log.info.tree_paths)))
 
 
 def _tiles(values: Any) -> list[Tile]:

@@ -71,7 +71,8 @@ class TimelineRecorder:
             told = plan_markdown(record.plan, record.plan_step)
             stream.log("plan", rr.TextDocument(told, media_type="text/markdown"))
         for event in record.events:
-            entry = rr.TextLog(event.sentence, level=_LEVELS[event.level])
+            told = "\n".join([event.sentence, *event.data.get("chain", ())])
+            entry = rr.TextLog(told, level=_LEVELS[event.level])
             stream.log(f"log/{event.kind}", entry)
         urgent = any(event.level == "error" for event in record.events)
         if urgent or record.tick % _FLUSH_EVERY == 0:

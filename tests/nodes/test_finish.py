@@ -39,6 +39,6 @@ def test_it_decides_the_outcome_with_the_share_seen(bench):
 
 def test_an_earlier_outcome_stands(bench):
     bench.world.visibility = 1.0
-    bench.board.end("human", "asked before")
+    bench.board.end("human", "asked before", Code.ASKED)
     bench.tick(bench.node(Finish))
     assert (bench.board.outcome, bench.board.outcome_reason) == ("human", "asked before")

@@ -39,4 +39,4 @@ def test_the_message_carries_the_numbers(bench):
     bench.board.force_over_s = 0.75
     node = bench.node(ForceAccepted)
     bench.tick(node)
-    assert node.feedback_message == "0.42 N, over 0.30 N for 0.75 s"
+    assert node.feedback_message == ("the force is 0.42 N, over its threshold of 0.30 N for 0.75 s")

@@ -20,6 +20,9 @@ def test_an_unknown_state_is_not_reached(bench):
     """Nothing is learned from, and no human called for, on the strength of no data."""
     node = bench.node(WarningReached, state=1)
     bench.warn(None)
-    assert (bench.tick(node), node.feedback_message) == (Status.FAILURE, "warning state unknown")
+    assert (bench.tick(node), node.feedback_message) == (
+        Status.FAILURE,
+        "the warning state is unknown",
+    )
     bench.warn(3, mu_m=float("nan"))
     assert bench.tick(node) == Status.FAILURE
