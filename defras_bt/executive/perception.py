@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
@@ -11,7 +11,9 @@ from defras_bt.executive.grips import GripTracker
 from defras_bt.learning.buffer import KeyframeBuffer
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.monitoring.warning import WarningMonitor
+from defras_bt.sensing.arms import ArmPlausibility
 from defras_bt.sensing.freshness import stale
+from defras_bt.sensing.latest import LatestReadings
 from defras_bt.sensing.sense import SensedObservation, sense
 from defras_sim.tissue.state import TissueState
 from defras_sim.twin import Twin
@@ -38,12 +40,20 @@ class Perception:
         self._operator_stop = operator_stop
         self._grips = GripTracker(board, twin)
         self._touched = False
+        self._latest = LatestReadings(twin.scene)
+        self._arms = ArmPlausibility(twin.scene)
+        self._time_s = -np.inf
 
     def update(self, tick: int, observation: Observation) -> TickInputs:
         """Everything the tree may know at this tick."""
         scene, board = self._twin.scene, self._board
-        sensed = sense(observation, scene)
-        missing = stale(sensed, scene)
+        operator_stop = self._operator_stop()
+        sensed = sense(self._latest.update(observation), scene)
+        missing = {
+            **self._standstill(sensed.time_s),
+            **self._arms.faults(sensed, driven_by_hand=operator_stop is not None),
+            **stale(sensed, scene),
+        }
         if self._grips.update(sensed, unsound=missing):
             self._touched = True
             self._keyframes.clear()
@@ -76,9 +86,16 @@ class Perception:
             force_n=force_n,
             force_threshold_n=self._force_threshold_n,
             reading=reading,
-            operator_stop=self._operator_stop(),
+            operator_stop=operator_stop,
             force_over_s=board.force_over_s,
         )
+
+    def _standstill(self, time_s: float) -> Mapping[str, str]:
+        """A clock that does not move on makes every old reading look fresh."""
+        before_s, self._time_s = self._time_s, time_s
+        if time_s > before_s:
+            return {}
+        return {"clock": f"the world's clock stands still at {time_s:.2f} s"}
 
     def _monitored(self, sensed: SensedObservation, state: TissueState) -> MonitorReading | None:
         # Tissue that was held once may lie otherwise: rest is what was seen before.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from defras_bt.sensing.cloud import tissue_points_m
+from defras_bt.sensing.cloud import Workspace, tissue_points_m
 from defras_bt.sensing.colours import DEFAULT_COLOURS, ColourCalibration
 from defras_bt.sensing.roi import roi_visibility
 from defras_sim.scene import Scene
@@ -67,8 +67,16 @@ def _with_cloud(
             f"at least {MIN_CLOUD_POINTS} are needed"
         )
         return _faulty(replace(sensed, cloud=None, dropped_points=dropped), reason)
-    if dropped or cloud is not sensed.cloud:
-        cloud = PointCloud(cloud.stamp_s, points[finite])
+    possible = finite & Workspace.of(scene).holds(points)
+    if possible.sum() < finite.sum() / 2:
+        share = possible.sum() / finite.sum()
+        reason = (
+            f"no cloud: only {share:.0%} of its points lie where tissue can be; it should be in "
+            "metres and in the tissue frame"
+        )
+        return _faulty(replace(sensed, cloud=None, dropped_points=dropped), reason)
+    if not possible.all() or cloud is not sensed.cloud:
+        cloud = PointCloud(cloud.stamp_s, points[possible])
     return replace(sensed, cloud=cloud, dropped_points=dropped)
 
 

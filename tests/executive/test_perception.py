@@ -49,6 +49,10 @@ class Senses:
     def grasp(self) -> None:
         self.bench.put("psm1", (*self.bench.scene.grasp_xy_m(2, 4), 0.0))
         self.bench.board.at["psm1"] = (2, 4)
+        # No arm gets there within a tick, unless by hand.
+        self.operator_stop = "the operator drives"
+        self.look()
+        self.operator_stop = None
         self.turn_jaw(JAW_OPEN_RAD)
         self.turn_jaw(JAW_CLOSED_RAD)
 
@@ -140,6 +144,36 @@ class TestMonitoring:
         senses.bench.board.rest_calibrated = True
         senses.look()
         assert senses.bench.monitor.rest_frames == 0
+
+
+class TestUnlikelyReadings:
+    """Well-formed readings that cannot be true."""
+
+    def test_a_clock_that_stands_still(self, senses):
+        senses.look()
+        senses.bench.world.ticks -= 1
+        assert senses.look().missing == ("the world's clock stands still at 0.00 s",)
+        assert senses.look().missing == ()
+
+    def test_a_tip_that_jumps_is_missing_until_it_is_back(self, senses):
+        senses.look()
+        home_m = senses.bench.tip_m()
+        senses.bench.put("psm1", home_m + [0.02, 0.0, 0.0])
+        for _ in range(3):
+            (sentence,) = senses.look().missing
+            assert "psm1 is 20.0 mm away from where it can be" in sentence
+        senses.bench.put("psm1", home_m)
+        assert senses.look().missing == ()
+
+    def test_messages_that_overtake_each_other_do_not_turn_time_back(self, senses):
+        world = senses.bench.world
+        old = world.observe()
+        for _ in range(3):
+            world.command(Command({"psm1": ArmCommand(np.array([0.0, 0.0, 0.05]))}))
+            seen = senses.look()
+        late = senses.perception.update(world.ticks, replace(world.observe(), arms=old.arms))
+        assert late.missing == ()
+        assert late.observation.arms == seen.observation.arms
 
 
 class TestGrips:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from defras_sim.geometry import Floats, Pose
-from defras_sim.scene import Attachments, Roi, Scene
+from defras_sim.scene import Attachments, Camera, Roi, Scene
 from defras_sim.surface import Surface
 from defras_sim.worlds.kinematic_tool import KinematicTool
 from defras_sim.worlds.protocol import (
@@ -21,11 +21,12 @@ from defras_sim.worlds.protocol import (
 
 
 def bench_scene() -> Scene:
-    """Held along the largest x; the region lies on the free side."""
+    """Held along the largest x; the region lies on the free side. The camera has no noise."""
     return Scene(
         name="bench",
         attachments=Attachments(map=("..........##",) * 12),
         roi=Roi(center_x_m=0.01, center_y_m=0.0),
+        depth_camera=Camera(position_m=(0.17, 0.0, 0.20), target_m=(0.0, 0.0, 0.0)),
     )
 
 

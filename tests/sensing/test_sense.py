@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from defras_bt.sensing.sense import sense
 from defras_sim.camera.pinhole import intrinsics, tissue_from_camera
@@ -14,7 +15,7 @@ from defras_sim.worlds.protocol import CameraImage, Observation, PointCloud
 SCENE = Scene(
     name="s", attachments=Attachments(map=("#" * 12,) * 12), roi=Roi(center_x_m=0, center_y_m=0)
 )
-POINTS = np.random.default_rng(0).uniform(-0.05, 0.05, (100, 3))
+POINTS = np.random.default_rng(0).uniform((-0.05, -0.05, 0.0), 0.05, (100, 3))
 
 
 def ready_made() -> Observation:
@@ -96,3 +97,24 @@ def test_an_impossible_visibility_is_not_believed() -> None:
         assert sensed.roi_visibility is None
         assert sensed.roi_visibility_stamp_s is None
         assert "not between 0 and 1" in sensed.faults[0]
+
+
+@pytest.mark.parametrize(
+    ("changed", "share"),
+    [
+        (lambda m: 1e3 * m, "0%"),  # in millimetres
+        (lambda m: tissue_from_camera(SCENE.depth_camera).inverse().apply(m), "0%"),
+    ],
+    ids=["millimetres", "camera frame"],
+)
+def test_a_cloud_of_another_unit_or_frame_is_no_cloud(changed, share) -> None:
+    sensed = sense(replace(ready_made(), cloud=PointCloud(1.9, changed(POINTS))), SCENE)
+    assert sensed.cloud is None
+    assert f"only {share} of its points lie where tissue can be" in sensed.faults[-1]
+
+
+def test_a_few_points_elsewhere_are_left_out() -> None:
+    points = np.vstack([POINTS, np.full((10, 3), 0.3)])
+    sensed = sense(replace(ready_made(), cloud=PointCloud(1.9, points)), SCENE)
+    assert sensed.cloud is not None
+    np.testing.assert_array_equal(sensed.cloud.points_m, POINTS)

@@ -1,0 +1,96 @@
+"""Whether the arms are where they were told to be, and where they can have come to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from defras_sim.geometry import Floats
+from defras_sim.scene import Scene
+from defras_sim.worlds.protocol import ArmObservation, Observation
+
+FOLLOWING_M = 0.003
+"""Farther than this from its set-point, a tip does not follow: three times a dVRK's usual error,
+sixty times that of the arms in PyBullet at full speed."""
+JUMP_M = 0.002
+"""A tip may be this much farther on than its speed explains: noise, and the roundness of stamps."""
+
+
+class ArmPlausibility:
+    """Finds readings of arms that are well-formed and still cannot be acted on.
+
+    A tip that left its set-point (a blocked or switched-off arm) is unsound as long as it is away.
+    A tip or set-point that jumped (a slipped encoder, another frame) is unsound until it is back
+    where it was lost: where it really is, nobody knows. After the operator drove the arms
+    themselves, where they stand is believed anew.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._speed_m_s = scene.motion.reach_speed_m_s
+        self._last: dict[str, ArmObservation] = {}
+        self._lost: dict[str, ArmObservation] = {}
+
+    def faults(self, observation: Observation, *, driven_by_hand: bool) -> Mapping[str, str]:
+        """A sentence for each arm that must not be acted on; call it once per tick."""
+        found: dict[str, str] = {}
+        for name, arm in observation.arms.items():
+            if not _is_sound(arm):
+                continue  # freshness says so already
+            jumped_m = 0.0 if driven_by_hand else self._jump_m(name, arm)
+            if driven_by_hand:
+                self._lost.pop(name, None)
+            self._last[name] = arm
+            away_m = _distance_m(
+                arm.tissue_from_tip.position_m, arm.setpoint_tissue_from_tip.position_m
+            )
+            if away_m > FOLLOWING_M:
+                found[name] = (
+                    f"{name} does not follow: its tip is {away_m * 1e3:.1f} mm away from where it "
+                    f"was told to be, at most {FOLLOWING_M * 1e3:g} mm are allowed"
+                )
+            elif jumped_m > 0.0:
+                found[name] = (
+                    f"{name} is {jumped_m * 1e3:.1f} mm away from where it can be: its position "
+                    "jumped and is not believed until it is back"
+                )
+        return found
+
+    def _jump_m(self, name: str, arm: ArmObservation) -> float:
+        """How far an arm is from where it was lost; 0 while it is not lost."""
+        if name in self._lost:
+            away_m = _moved_m(self._lost[name], arm)
+            if away_m > JUMP_M:
+                return away_m
+            del self._lost[name]
+            return 0.0
+        last = self._last.get(name)
+        if last is None:
+            return 0.0
+        most_m = JUMP_M + self._speed_m_s * max(0.0, arm.stamp_s - last.stamp_s)
+        moved_m = _moved_m(last, arm)
+        if moved_m <= most_m:
+            return 0.0
+        self._lost[name] = last
+        return moved_m
+
+
+def _is_sound(arm: ArmObservation) -> bool:
+    poses = (arm.tissue_from_tip, arm.setpoint_tissue_from_tip)
+    return bool(all(np.isfinite(pose.position_m).all() for pose in poses)) and bool(
+        np.isfinite(arm.stamp_s)
+    )
+
+
+def _moved_m(one: ArmObservation, other: ArmObservation) -> float:
+    """The larger way of tip and set-point between two readings."""
+    return max(
+        _distance_m(one.tissue_from_tip.position_m, other.tissue_from_tip.position_m),
+        _distance_m(
+            one.setpoint_tissue_from_tip.position_m, other.setpoint_tissue_from_tip.position_m
+        ),
+    )
+
+
+def _distance_m(one: Floats, other: Floats) -> float:
+    return float(np.linalg.norm(one - other))

@@ -1,0 +1,68 @@
+"""Arms that do not follow, and arms that are where they cannot be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from defras_bt.sensing.arms import FOLLOWING_M, JUMP_M, ArmPlausibility
+from defras_sim.geometry import Pose
+from defras_sim.scene import Attachments, Roi, Scene
+from defras_sim.worlds.protocol import ArmObservation, Observation
+
+SCENE = Scene(
+    name="s", attachments=Attachments(map=("#" * 12,) * 12), roi=Roi(center_x_m=0, center_y_m=0)
+)
+SPEED_M_S = SCENE.motion.reach_speed_m_s
+
+
+def faults(
+    check: ArmPlausibility,
+    time_s: float,
+    x_m: float,
+    setpoint_x_m: float | None = None,
+    *,
+    by_hand: bool = False,
+) -> str:
+    """What is said of an arm at ``x_m``; "" if nothing."""
+    at = Pose(np.array([x_m, 0.0, 0.0]))
+    told = at if setpoint_x_m is None else Pose(np.array([setpoint_x_m, 0.0, 0.0]))
+    arm = ArmObservation(time_s, at, told, 0.0)
+    return check.faults(Observation(time_s, {"psm1": arm}), driven_by_hand=by_hand).get("psm1", "")
+
+
+@pytest.fixture
+def check() -> ArmPlausibility:
+    return ArmPlausibility(SCENE)
+
+
+def test_full_speed_is_believed_also_over_a_gap_in_the_messages(check) -> None:
+    for time_s in (0.0, 0.05, 0.1, 0.5, 0.55):
+        assert faults(check, time_s, SPEED_M_S * time_s) == ""
+
+
+def test_a_tip_away_from_its_set_point_does_not_follow(check) -> None:
+    assert faults(check, 0.0, 0.0, 0.9 * FOLLOWING_M) == ""
+    assert "psm1 does not follow: its tip is 3.3 mm away" in faults(check, 0.05, 0.0, 0.0033)
+    assert faults(check, 0.1, 0.0, 0.9 * FOLLOWING_M) == "", "it has caught up"
+
+
+def test_a_jump_is_not_believed_however_long_it_lasts(check) -> None:
+    faults(check, 0.0, 0.0)
+    for time_s in (0.05, 1.0, 10.0):
+        assert "20.0 mm away from where it can be" in faults(check, time_s, 0.02)
+    assert faults(check, 10.05, JUMP_M / 2) == "", "it is back"
+    assert faults(check, 10.1, JUMP_M / 2) == ""
+
+
+def test_what_was_driven_by_hand_is_believed_where_it_stands(check) -> None:
+    faults(check, 0.0, 0.0)
+    assert faults(check, 0.05, 0.05)
+    assert faults(check, 0.1, 0.08, by_hand=True) == ""
+    assert faults(check, 0.15, 0.08) == ""
+
+
+def test_what_is_no_number_is_left_to_freshness_and_is_no_place_to_jump_from(check) -> None:
+    faults(check, 0.0, 0.0)
+    assert faults(check, 0.05, float("nan")) == ""
+    assert faults(check, 0.1, 0.0) == ""
