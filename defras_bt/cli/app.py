@@ -4,38 +4,57 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
+from importlib import import_module
 
 import typer
 from rich.console import Console
 
-from defras_bt.cli import benchmark, doctor, explain, plan, run, scene, tree, view
 from defras_bt.cli.errors import ExitCode, UserError
-from defras_bt.executive.executive import ExecutiveFailed
-from defras_bt.recording.composite import RecordingFailed
 from defras_sim.yaml_source import InvalidFile
 
-app = typer.Typer(
-    name="defras",
-    help="Retract soft tissue autonomously while the model of the patient is not trusted.",
-    no_args_is_help=True,
-    rich_markup_mode="rich",
-    pretty_exceptions_enable=False,
-)
-app.command("run")(run.run)
-app.command("plan")(plan.plan)
-app.command("explain")(explain.explain)
-app.command("view")(view.view)
-app.command("doctor")(doctor.doctor)
-app.add_typer(scene.app, name="scene")
-app.add_typer(tree.app, name="tree")
-app.add_typer(benchmark.app, name="benchmark")
+COMMANDS = ("run", "plan", "view", "explain", "doctor")
+"""Commands, each the function of its name in the module of its name."""
+
+GROUPS = ("scene", "tree", "benchmark")
+"""Groups of commands, each the ``app`` of the module of its name."""
+
+
+_SPOKEN = ("ExecutiveFailed", "RecordingFailed")
+"""Errors whose message says it all; by name, because their modules are loaded only where needed."""
+
+
+def application(arguments: Sequence[str]) -> typer.Typer:
+    """The command line as far as ``arguments`` need it.
+
+    Loading everything takes seconds, most of it for drawing and simulating. So only the command
+    that is asked for is loaded, and all of them where none is or help is wanted.
+    """
+    app = typer.Typer(
+        name="defras",
+        help="Retract soft tissue autonomously while the model of the patient is not trusted.",
+        no_args_is_help=True,
+        rich_markup_mode="rich",
+        pretty_exceptions_enable=False,
+    )
+    # A group keeps its name only beside another command, so the callback is there for all cases.
+    app.callback()(lambda: None)
+    asked = arguments[0] if arguments else ""
+    known = asked in (*COMMANDS, *GROUPS)
+    for name in COMMANDS:
+        if name == asked or not known:
+            app.command(name)(getattr(import_module(f"defras_bt.cli.{name}"), name))
+    for name in GROUPS:
+        if name == asked or not known:
+            app.add_typer(import_module(f"defras_bt.cli.{name}").app, name=name)
+    return app
 
 
 def run_commands() -> None:
     """Run the command line; exit codes are those of :class:`ExitCode`."""
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     try:
-        app()
+        application(sys.argv[1:])()
     except InvalidFile as error:
         for fault in error.faults:
             console.print(str(fault), style="red", markup=False)
@@ -46,11 +65,7 @@ def run_commands() -> None:
     except Exception as error:
         if os.environ.get("DEFRAS_DEBUG"):
             raise
-        what = error if isinstance(error, ExecutiveFailed | RecordingFailed) else _named(error)
+        what = error if type(error).__name__ in _SPOKEN else f"{type(error).__name__}: {error}"
         console.print(f"internal error: {what}", style="red", markup=False)
         console.print("Set DEFRAS_DEBUG=1 to see where it happened.", style="dim")
         sys.exit(ExitCode.INTERNAL)
-
-
-def _named(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
