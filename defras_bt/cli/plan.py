@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import find_scene, folder_for
 from defras_bt.executive.operation import WORLDS
+from defras_bt.planning.advice_file import add_advice, rule_name
 from defras_bt.planning.engine import (
     VALID,
     Engine,
@@ -27,6 +29,7 @@ from defras_bt.planning.plan_file import InvalidPlanFile, StalePlanFile, save_pl
 from defras_bt.planning.preoperative import PreoperativeResult, preoperative_plans
 from defras_bt.planning.preparation import Preparation, prepare
 from defras_bt.planning.rehearsals import Progress as Report
+from defras_sim.advice import Advice
 from defras_sim.scene import Scene
 
 
@@ -41,21 +44,35 @@ def plan(
         int, typer.Option(min=-1, help="Rehearsals side by side; -1: one per core.")
     ] = -1,
     engine: Annotated[str, typer.Option(help=f"Where to rehearse: {VALID}.")] = "local",
+    forbid: Annotated[
+        str | None, typer.Option(help='Add a rule first, like "grasp psm1 point (2,3)".')
+    ] = None,
+    prefer: Annotated[
+        str | None, typer.Option(help="Add a preference first; it makes no plan longer.")
+    ] = None,
+    reason: Annotated[str | None, typer.Option(help="Why; kept with the rule.")] = None,
+    name: Annotated[str | None, typer.Option(help="The rule's name.")] = None,
 ) -> None:
     """Rehearse every retraction in simulation and choose the plan for this patient.
 
     Also derives the force threshold, twice the median of the largest forces of all rehearsals of
-    all scenes given. With --out a search that was killed goes on where it was.
+    all scenes given. With --out a search that was killed goes on where it was. A rule given with
+    --forbid or --prefer is kept in the scene file, with its name and reason, for all later plans.
 
     Example: defras plan sim1 -o sim1.plan.json; defras run sim1 --plan sim1.plan.json
 
     Example: defras plan sim1 sim2 sim3 --out plans --engine dask
+
+    Example: defras plan my.yaml --forbid "grasp psm1 point (2,3)" --reason "a vein runs there"
     """
     if world not in WORLDS:
         raise UserError(f"--world {world}: valid are {', '.join(WORLDS)}")
     if jobs == 0:
         raise UserError("--jobs 0: give a number of processes, or -1 for one per core")
-    believed = [find_scene(scene)[1] for scene in scenes]
+    found = [find_scene(scene) for scene in scenes]
+    believed = [scene for _, scene in found]
+    if forbid or prefer or reason or name:
+        believed = [_advised(found[0][0], scenes, forbid, prefer, reason, name)]
     try:
         where = engine_named(engine, jobs)
     except UnknownEngine as error:
@@ -75,9 +92,11 @@ def plan(
             )
     except (EngineUnavailable, InvalidJournal) as error:
         raise UserError(str(error)) from error
-    for i, result in enumerate(results):
+    for i, (scene, result) in enumerate(zip(believed, results, strict=True)):
         if len(results) > 1:
             console.print(f"Scene {result.scene}:", markup=False)
+        for rule in scene.advice:
+            console.print(f"Kept in the scene: {rule.sentence()}.", markup=False)
         tell(result, console)
         if files:
             try:
@@ -87,6 +106,36 @@ def plan(
             console.print(f"Written to {files[i]}", markup=False)
     if journal is not None:
         journal.file.unlink(missing_ok=True)
+
+
+def _advised(
+    file: Path,
+    scenes: list[str],
+    forbid: str | None,
+    prefer: str | None,
+    reason: str | None,
+    name: str | None,
+) -> Scene:
+    """Add the rule to the scene file; the scene as it is then."""
+    if len(scenes) > 1:
+        raise UserError(f"a rule belongs to one scene; {len(scenes)} were given")
+    if not Path(scenes[0]).is_file():
+        raise UserError(
+            f"a rule is kept in the scene's file, and {scenes[0]} is a shipped scene; copy {file} "
+            "and give the copy"
+        )
+    if (forbid is None) == (prefer is None):
+        raise UserError("--name and --reason belong to --forbid or --prefer; give one of them")
+    if not reason:
+        raise UserError('--reason is missing: say why, like --reason "a vein runs there"')
+    kind, text = ("forbid", forbid) if forbid is not None else ("prefer", prefer)
+    rule = {"name": name or rule_name(kind, text or ""), "reason": reason, kind: text}
+    try:
+        return add_advice(file, Advice.model_validate(rule))
+    except ValidationError as error:
+        raise UserError(f"--{kind}: {error.errors()[0]['msg']}") from error
+    except OSError as error:
+        raise UserError(f"{file}: {error}") from error
 
 
 def _plan_files(scenes: list[Scene], out: Path | None) -> list[Path]:

@@ -46,7 +46,7 @@ def attachment_distances_mm(scene: Scene, attached: NDArray[np.bool_]) -> dict[G
 
 
 def scene_facts(scene: Scene) -> str:
-    """Facts that never change: arms, grasp points, distances to the region of interest."""
+    """Facts that never change: arms, grasp points, distances to the region, the expert's rules."""
     lines = [
         f"arm({name},{_SIDES[arm.side]},{rank})."
         for rank, (name, arm) in enumerate(sorted(scene.arms.items()), start=1)
@@ -58,7 +58,17 @@ def scene_facts(scene: Scene) -> str:
         lines.append(f"grasp_point({place},{x_mm},{y_mm}).")
         lines.append(f"distance_to_roi({place},{to_roi[point]}).")
         lines.append(f"point_rank({place},{rank}).")
+    for number, advice in enumerate(scene.advice):
+        about = advice.matter
+        place = "any" if about.point is None else _text(about.point)
+        words = f"{advice.kind},{about.action or 'any'},{about.arm or 'any'},{place}"
+        lines.append(f"advice({number},{words}).")
     return "\n".join(lines)
+
+
+def advice_atoms(scene: Scene) -> set[Symbol]:
+    """The external atoms that put the scene's rules in force."""
+    return {Function("advised", [Number(number)]) for number in range(len(scene.advice))}
 
 
 def belief_facts(distances_mm: dict[GridPoint, int]) -> str:

@@ -16,6 +16,7 @@ from defras_bt.planning.english import (
     reason_sentence,
 )
 from defras_bt.planning.facts import (
+    advice_atoms,
     attachment_distances_mm,
     belief_facts,
     require_valid,
@@ -99,7 +100,7 @@ class Planner:
         """
         needed = tuple(situation.exposing if exposing is None else exposing)
         require_valid(self.scene, situation, needed, required_grasp)
-        world = world_atoms(situation, needed, required_grasp)
+        world = world_atoms(situation, needed, required_grasp) | advice_atoms(self.scene)
         attachment_mm = attachment_distances_mm(self.scene, attached)
         if self._program.beliefs >= MAX_BELIEFS:
             self._program = self._grounded()
@@ -121,6 +122,10 @@ class Planner:
         why = {
             atom.arguments[2].number: atom.arguments[1].name for atom in shown.get("because", [])
         }
+        followed: dict[int, list[str]] = {}
+        for atom in shown.get("follows", []):
+            rule, time = (argument.number for argument in atom.arguments)
+            followed.setdefault(time, []).append(self.scene.advice[rule].sentence())
         steps = [atom for name, atoms in shown.items() if name in ACTIONS for atom in atoms]
         actions = tuple(
             sorted((_action(step, situation, target) for step in steps), key=lambda a: a.time)
@@ -130,7 +135,13 @@ class Planner:
             cost=answer.cost,
             proved_shortest=True,
             reasons=tuple(
-                self._reason(why[action.time], action, attachment_mm) for action in actions
+                "; ".join(
+                    [
+                        self._reason(why[action.time], action, attachment_mm),
+                        *followed.get(action.time, []),
+                    ]
+                )
+                for action in actions
             ),
         )
 
@@ -145,7 +156,11 @@ class Planner:
         core = self._program.conflict(removable, self.budget_s)
         if core is None:
             raise RuntimeError("a plan exists that the optimisation did not find")
-        sentences = list(obstacle_sentences(core, len(self.scene.grasp_points)))
+        rules = [self.scene.advice[a.arguments[0].number] for a in core if a.name == "advised"]
+        sentences = [
+            *obstacle_sentences(core, len(self.scene.grasp_points)),
+            *(rule.sentence() for rule in rules),
+        ]
         if required is not None and not self.scene.arms_at(*required):
             sentences.append(
                 f"{point_text(required)} lies on the side of the x-z plane that no arm reaches; "

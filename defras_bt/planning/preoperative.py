@@ -20,6 +20,7 @@ from defras_bt.planning.plan import ArmSituation, Plan, Situation
 from defras_bt.planning.planner import Planner
 from defras_bt.planning.rehearsals import STEP_M, Progress, rehearse_all
 from defras_bt.planning.scene_hash import scene_hash
+from defras_sim.retraction import arm_for
 from defras_sim.scene import Scene
 
 THRESHOLD_OVER_MEDIAN = 2.0
@@ -105,7 +106,8 @@ def result_of(
             "anything is moved; put the region deeper under the tissue"
         )
     limit_n = scene.thresholds.force_n or THRESHOLD_OVER_MEDIAN * median_n
-    chosen = choose(executions, scene.thresholds.roi_visibility, limit_n)
+    allowed = [execution for execution in executions if not forbidden(scene, execution)]
+    chosen = choose(allowed, scene.thresholds.roi_visibility, limit_n)
     planner, situation = Planner(scene), Situation({name: ArmSituation() for name in scene.arms})
     if chosen is None:
         plan = planner.plan(situation, scene.attached)
@@ -132,6 +134,17 @@ def result_of(
         chosen=chosen,
         plan=plan,
         reason=reason,
+    )
+
+
+def forbidden(scene: Scene, execution: Execution) -> bool:
+    """Whether a rule of the scene forbids an action of this retraction."""
+    arm = arm_for(scene, execution.point)
+    actions = ("reach", "open", "grasp", *execution.manoeuvres)
+    return any(
+        advice.kind == "forbid" and advice.matter.covers(action, arm, execution.point)
+        for advice in scene.advice
+        for action in actions
     )
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from clingo import Control, Function, Model, Number, Symbol
 
-PROGRAMS = ("asp/retraction.lp", "asp/grasp_choice.lp", "asp/explain.lp")
+PROGRAMS = ("asp/retraction.lp", "asp/advice.lp", "asp/grasp_choice.lp", "asp/explain.lp")
 
-# Of the weak constraints in asp/grasp_choice.lp, the most important first.
-PRIORITIES = (5, 4, 3, 2, 1)
+# Of the weak constraints in asp/advice.lp (6) and asp/grasp_choice.lp, the most important first.
+PRIORITIES = (6, 5, 4, 3, 2, 1)
 
 # Each try is a solve of its own; beyond this an explanation of a huge grid would take minutes.
 MAX_DELETIONS = 60
@@ -23,7 +23,7 @@ class PlanningTimeout(Exception):
 
 @dataclass(frozen=True)
 class Answer:
-    """The best answer set at a horizon: what it shows, and its cost per priority (5 to 1)."""
+    """The best answer set at a horizon: what it shows, and its cost per priority (6 to 1)."""
 
     shown: tuple[Symbol, ...]
     cost: tuple[int, ...]

@@ -7,7 +7,7 @@ import json
 
 from defras_sim.scene import Scene
 
-_PARTS = {"tissue", "attachments", "grasp", "roi", "arms", "endoscope", "motion", "model"}
+_PARTS = {"tissue", "attachments", "grasp", "roi", "arms", "endoscope", "motion", "model", "advice"}
 _THRESHOLDS = {"force_n", "roi_visibility"}
 
 

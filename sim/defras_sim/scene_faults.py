@@ -10,6 +10,7 @@ import numpy as np
 from defras_sim.yaml_source import Location
 
 if TYPE_CHECKING:
+    from defras_sim.anatomy.anatomy import Anatomy
     from defras_sim.scene import Scene
 
 SceneFault = tuple[Location, str]
@@ -19,6 +20,7 @@ _ROUNDING_M = 1e-12
 _MOST_ELEMENTS = 64
 """Along one side. A mesh this fine already needs minutes for one step."""
 _MOST_HOLES = 2500
+_BOX_TOLERANCE_M = 5e-4
 
 
 def scene_faults(scene: Scene) -> Iterator[SceneFault]:
@@ -44,11 +46,15 @@ def scene_faults(scene: Scene) -> Iterator[SceneFault]:
     yield from _place_faults(scene)
     yield from _mesh_faults(scene)
     yield from _setup_faults(scene)
+    yield from _advice_faults(scene)
 
 
 def _attachment_faults(scene: Scene) -> Iterator[SceneFault]:
     nx, ny = scene.hole_counts
     rows = scene.attachments.map
+    if scene.tissue.anatomy is not None and all(len(row) == nx for row in rows) and len(rows) == ny:
+        yield from _blank_faults(scene)
+        rows = tuple(row.replace(" ", ".") for row in rows)
     if len(rows) != ny:
         yield ("attachments", "map"), f"attachments.map: {len(rows)} rows, needs {ny}"
     for i, row in enumerate(rows):
@@ -60,8 +66,56 @@ def _attachment_faults(scene: Scene) -> Iterator[SceneFault]:
         yield ("attachments", "map"), message
 
 
+def _blank_faults(scene: Scene) -> Iterator[SceneFault]:
+    """The map of an anatomy's holes is blank where there is no tissue, and only there."""
+    nx, ny = scene.hole_counts
+    for i, (row, is_hole) in enumerate(
+        zip(scene.attachments.map, scene.is_hole.reshape(ny, nx)[::-1], strict=True)
+    ):
+        wrong = [k for k, mark in enumerate(row) if (mark == " ") == is_hole[k]]
+        if wrong:
+            valid = "".join(
+                ("#" if m == "#" else ".") if h else " " for m, h in zip(row, is_hole, strict=True)
+            )
+            yield (
+                ("attachments", "map", i),
+                f"attachments.map.{i}: {row!r} should be blank where there is no tissue, and only "
+                f"there, as in {valid!r}",
+            )
+
+
+def _anatomy_faults(scene: Scene, anatomy: Anatomy) -> Iterator[SceneFault]:
+    tissue = scene.tissue
+    if tissue.element != "tetrahedron10":
+        message = f"tissue.element: {tissue.element}; an anatomy's meshes are of tetrahedron10"
+        yield ("tissue", "element"), message
+    size_m = anatomy.high_m - anatomy.low_m
+    for key, is_m, should_m in (
+        ("length_x_m", tissue.length_x_m, size_m[0]),
+        ("width_y_m", tissue.width_y_m, size_m[1]),
+    ):
+        if abs(is_m - should_m) > _BOX_TOLERANCE_M:
+            message = f"tissue.{key}: {is_m}; the anatomy measures {should_m:.4f}"
+            yield ("tissue", key), message
+    turn = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+    rim_m = scene.roi.radius_m * np.column_stack([np.cos(turn), np.sin(turn)])
+    if not anatomy.covers(scene.roi_center_m[:2] + rim_m).all():
+        yield (
+            ("roi", "center_x_m"),
+            f"roi: a disc of radius {scene.roi.radius_m} around ({scene.roi.center_x_m}, "
+            f"{scene.roi.center_y_m}) reaches out from under the tissue; valid is a disc wholly "
+            "below it",
+        )
+    if not scene.grasp_points:
+        message = "grasp: no place of the grid has tissue; more columns and rows may find some"
+        yield ("grasp",), message
+
+
 def _place_faults(scene: Scene) -> Iterator[SceneFault]:
     """Region and grasp points have to lie on the tissue."""
+    if scene.tissue.anatomy is not None:
+        yield from _anatomy_faults(scene, scene.tissue.anatomy)
+        return
     roi, grid = scene.roi, scene.grasp
     half_m = np.array([scene.tissue.length_x_m, scene.tissue.width_y_m]) / 2
     for axis, center_m, most_m in zip("xy", (roi.center_x_m, roi.center_y_m), half_m, strict=True):
@@ -108,3 +162,19 @@ def _setup_faults(scene: Scene) -> Iterator[SceneFault]:
     for i, adopted in enumerate(scene.model.effects):
         message = f"model.effects.{i}: effect {adopted.effect!r} is unknown; available: none yet"
         yield ("model", "effects", i), message
+
+
+def _advice_faults(scene: Scene) -> Iterator[SceneFault]:
+    names: set[str] = set()
+    for i, advice in enumerate(scene.advice):
+        point, grid = advice.matter.point, scene.grasp
+        if point is not None and point not in scene.grasp_points:
+            message = (
+                f"advice.{i}: {point} is no grasp point; valid are (1,1) to "
+                f"({grid.columns},{grid.rows})"
+            )
+            yield ("advice", i, advice.kind), message
+        if advice.name in names:
+            message = f"advice.{i}: another rule is named {advice.name!r} already"
+            yield ("advice", i, "name"), message
+        names.add(advice.name)
