@@ -1,0 +1,121 @@
+"""What the proof counts on is what the leaves do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from py_trees.common import Status
+
+from defras_bt.executive.proof.claims import WORLD
+from defras_bt.executive.proof.promises import (
+    ALWAYS,
+    COMMANDING,
+    LONGEST_PATIENCE_S,
+    PROMISES,
+)
+from defras_bt.executive.registry import builtin_nodes
+from defras_sim.worlds.protocol import HOLD
+from tests.nodes.bench import EPSILON_N, Bench
+
+Situation = Callable[[Bench], None]
+
+
+def says(**inputs: object) -> Situation:
+    return lambda bench: bench.says.update(inputs)
+
+
+def force_for(over_s: float, force_n: float = 2 * EPSILON_N) -> Situation:
+    def put(bench: Bench) -> None:
+        bench.says.update(force_n=force_n, force_over_s=over_s)
+        bench.board.force_over_s = over_s
+
+    return put
+
+
+def warning(state: int | None) -> Situation:
+    return lambda bench: bench.warn(state)
+
+
+SITUATIONS: dict[tuple[str, str], list[Situation]] = {
+    ("readings", "fresh"): [says(missing=())],
+    ("readings", "missing"): [says(missing=("no cloud",)), says(missing=("a", "b"))],
+    ("operator", "silent"): [says(operator_stop=None)],
+    ("operator", "stops"): [says(operator_stop="the pedal was pressed")],
+    ("force", "tolerable"): [force_for(0.0, 0.1), force_for(0.3)],
+    ("force", "dangerous"): [
+        force_for(LONGEST_PATIENCE_S),
+        force_for(99.0),
+        force_for(0.0, math.nan),
+        force_for(LONGEST_PATIENCE_S, math.inf),
+    ],
+    ("warning", "unknown"): [
+        warning(None),
+        lambda bench: bench.warn(0, mu_m=math.nan),
+        lambda bench: setattr(bench.board, "metric", None),
+    ],
+    **{("warning", str(state)): [warning(state)] for state in range(4)},
+}
+"""What each value of a variable of the world looks like to a leaf."""
+
+PARAMETERS = {
+    "ForceAccepted": [{"patience_s": 0.0}, {"patience_s": 0.5}, {"patience_s": 1.0}],
+    "WarningBelow": [{"state": state} for state in (1, 2, 3)],
+    "WarningReached": [{"state": state} for state in (1, 2, 3)],
+    "Wait": [{"seconds": 1.0}],
+}
+ALL = [(*key, index) for key, some in SITUATIONS.items() for index in range(len(some))]
+
+
+def test_every_value_of_the_world_is_tried():
+    assert set(SITUATIONS) == {(name, value) for name, values in WORLD.items() for value in values}
+
+
+@pytest.mark.parametrize(("name", "variable"), list(PROMISES))
+def test_promises_are_kept(name, variable):
+    promise, node_class = PROMISES[name, variable], builtin_nodes()[name]
+    kept = 0
+    for value in WORLD[variable]:
+        for situation in SITUATIONS[variable, value]:
+            for parameters in PARAMETERS.get(name, [{}]):
+                bench = Bench()
+                situation(bench)
+                node = bench.node(node_class, **parameters)
+                promised = promise(node.parameters, value)
+                status = bench.tick(node)
+                assert promised in (status, None), (value, parameters)
+                kept += promised is not None
+    assert kept
+
+
+def test_a_guard_that_is_too_patient_promises_nothing():
+    node_class = builtin_nodes()["ForceAccepted"]
+    patient = node_class.Parameters(patience_s=LONGEST_PATIENCE_S + 0.1)
+    assert PROMISES["ForceAccepted", "force"](patient, "dangerous") is None
+
+
+@pytest.mark.parametrize(("variable", "value", "index"), ALL)
+@pytest.mark.parametrize("held", [False, True], ids=["nothing held", "tissue held"])
+def test_leaves_answer_and_command_as_the_proof_says(variable, value, index, held):
+    for name, node_class in builtin_nodes().items():
+        if node_class.role == "motion":
+            continue
+        for parameters in PARAMETERS.get(name, [{}]):
+            bench = Bench()
+            if held:
+                bench.hold()
+            SITUATIONS[variable, value][index](bench)
+            status = bench.tick(bench.node(node_class, **parameters))
+            assert status in ALWAYS.get(name, set(Status) - {Status.INVALID}), name
+            assert name in COMMANDING or bench.board.command == HOLD, name
+
+
+def test_those_who_may_command_without_moving_do_not_move():
+    bench = Bench()
+    bench.hold()
+    before_m = bench.tip_m().copy()
+    (name,) = COMMANDING
+    assert bench.tick(bench.node(builtin_nodes()[name])) == Status.RUNNING
+    assert bench.commanded_jaw_rad() is not None
+    assert (bench.tip_m() == before_m).all()
