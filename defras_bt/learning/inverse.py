@@ -13,7 +13,7 @@ from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
 from defras_bt.learning.hold_out import Split, split
 from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_bt.learning.search import AttachmentSearch, Mask, SearchResult
-from defras_sim.scene import Scene, hole_stiffness_n_per_m
+from defras_sim.scene import Scene
 from defras_sim.tissue.state import TissueState
 
 
@@ -49,7 +49,7 @@ class InverseEstimator:
         try:
             start = self._search_coarse(belief, keyframes, parts)
             replay = Replay(belief, keyframes)
-            before = replay.repeat(hole_stiffness_n_per_m(belief.attached))
+            before = replay.repeat(belief.hole_stiffness_n_per_m(belief.attached))
             found = self._search_fine(belief, replay, parts, start)
             before_m = _judging_distance_m(belief, parts, before)
         except NotRepeatable as fault:
@@ -58,7 +58,7 @@ class InverseEstimator:
             reason = "no change of attachments explains the observed shapes better"
             return _kept(belief, reason, found, before_m)
         try:
-            after = replay.repeat(hole_stiffness_n_per_m(found.attached))
+            after = replay.repeat(belief.hole_stiffness_n_per_m(found.attached))
             hearing = Hearing(belief.depth_camera, keyframes, parts, before, after)
             evidence = hearing.evidence(rng)
             objection = hearing.objection(self.rule, evidence)
@@ -83,7 +83,7 @@ class InverseEstimator:
         x, y = (max(2, int(np.ceil(count - 1e-9))) for count in cells)
         coarse = (x, y, 1) if tissue.element == "hexahedron20" else tissue.elements_xyz
         replay = Replay(belief, keyframes, coarse)
-        replay.repeat(hole_stiffness_n_per_m(belief.attached))
+        replay.repeat(belief.hole_stiffness_n_per_m(belief.attached))
         searcher = self._searcher(belief, replay, parts)
         return searcher.run(belief.attached, self.coarse_rounds).attached
 

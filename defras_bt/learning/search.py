@@ -19,7 +19,7 @@ from defras_bt.learning.misfit import Misfit, misfit
 from defras_bt.learning.observed_cells import ObservedCells
 from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_sim.geometry import Floats
-from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene, hole_stiffness_n_per_m
+from defras_sim.scene import Scene
 from defras_sim.surface import Surface
 
 Mask = NDArray[np.bool_]
@@ -165,12 +165,12 @@ class AttachmentSearch:
     def _change(self, here: Mask, blocks: Indices, sets: Mask) -> Floats:
         """Stiffness (b, q) that each hole of each block gains."""
         after = np.take_along_axis(sets, blocks, axis=1).astype(float)
-        return RIGID_HOLE_N_PER_M * (after - here[blocks])
+        return self._belief.hold_n_per_m * (after - here[blocks])
 
     def _true_cost(self, attached: Mask, *, keep: bool) -> float:
         """Cost from the model itself; infinite where it finds no shape."""
         self._solves += len(self._frames)
-        stiffness = hole_stiffness_n_per_m(attached)
+        stiffness = self._belief.hole_stiffness_n_per_m(attached)
         states = self._replay.shapes(stiffness, self._frames, keep=keep)
         if states is None:
             return float("inf")
@@ -195,9 +195,10 @@ class AttachmentSearch:
         holes = np.flatnonzero(self._observable(attached))
         self._place_of[:] = -1
         self._place_of[holes] = np.arange(len(holes))
+        stiffness = self._belief.hole_stiffness_n_per_m(attached)
         frames = []
         for frame, cells, compared in zip(self._frames, self._cells, self._misfits, strict=True):
-            response = self._replay.response(frame, hole_stiffness_n_per_m(attached), holes)
+            response = self._replay.response(frame, stiffness, holes)
             frames.append(
                 LinearisedFrame(
                     cells.residual_m(compared),

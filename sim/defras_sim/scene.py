@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from defras_sim.advice import Advice
 from defras_sim.geometry import Floats
 from defras_sim.scene_faults import scene_faults
 from defras_sim.scene_parts import (
     ARMS,
+    RIGID_HOLE_N_PER_M,
     AdoptedEffect,
     Arm,
     ArmName,
@@ -24,6 +26,7 @@ from defras_sim.scene_parts import (
     Camera,
     ElementName,
     GraspGrid,
+    GraspPoint,
     MaterialName,
     ModelExtension,
     Motion,
@@ -56,23 +59,11 @@ __all__ = [
     "Thresholds",
     "Tissue",
     "Vector",
-    "hole_stiffness_n_per_m",
     "load_scene",
 ]
 
-GraspPoint = tuple[int, int]
-"""(column, row), both from 1 at the smallest x and y."""
-
 # Nearer to the plane between the arms' sides than this is on it.
 _ON_PLANE_M = 1e-9
-
-# A hole that holds is a spring this stiff; the tissue under a hole gives way near 40 N/m.
-RIGID_HOLE_N_PER_M = 1e4
-
-
-def hole_stiffness_n_per_m(attached: NDArray[np.bool_]) -> Floats:
-    """Stiffness (holes,) of holes that hold or are free."""
-    return np.where(attached, RIGID_HOLE_N_PER_M, 0.0)
 
 
 class Scene(Part):
@@ -94,6 +85,7 @@ class Scene(Part):
     thresholds: Thresholds = Thresholds()
     model: ModelExtension = ModelExtension()
     simulation: Simulation = Simulation()
+    advice: tuple[Advice, ...] = ()
 
     @property
     def hole_counts(self) -> tuple[int, int]:
@@ -117,6 +109,15 @@ class Scene(Part):
     def attached(self) -> NDArray[np.bool_]:
         """Which holes hold (n,), in the order of :attr:`holes_xy_m`."""
         return np.array([mark == "#" for row in reversed(self.attachments.map) for mark in row])
+
+    @property
+    def hold_n_per_m(self) -> float:
+        """Stiffness of a hole that holds."""
+        return self.attachments.stiffness_n_per_m or RIGID_HOLE_N_PER_M
+
+    def hole_stiffness_n_per_m(self, attached: NDArray[np.bool_]) -> Floats:
+        """Stiffness of every hole (holes,) if ``attached`` (holes,) were those that hold."""
+        return np.where(attached, self.hold_n_per_m, 0.0)
 
     def grasp_xy_m(self, column: int, row: int) -> Floats:
         """Position (2,) of a grasp point; column and row count from 1."""

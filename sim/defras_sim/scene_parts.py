@@ -18,9 +18,16 @@ Side = Annotated[float, Field(gt=0, le=0.5)]
 Stroke = Annotated[float, Field(gt=0, le=0.2)]
 """Of an instrument, which reaches some 200 mm beyond its remote centre of motion."""
 
+# A rigid hole is a spring this stiff; the tissue under a hole gives way near 40 N/m.
+RIGID_HOLE_N_PER_M = 1e4
+
 MaterialName = Literal["corotational", "neo_hookean", "stable_neo_hookean"]
 ElementName = Literal["hexahedron20", "tetrahedron10", "tetrahedron4"]
 ArmName = Literal["psm1", "psm2"]
+
+
+GraspPoint = tuple[int, int]
+"""(column, row), both from 1 at the smallest x and y."""
 
 
 class Part(BaseModel):
@@ -53,11 +60,13 @@ class Attachments(Part):
     """Holes of the lower face and which of them hold the tissue.
 
     ``map`` is drawn as seen from above: first row at largest y, first column at smallest x;
-    ``#`` holds, ``.`` is free.
+    ``#`` holds, ``.`` is free. ``stiffness_n_per_m`` is how firmly each of them holds; without it
+    they are rigid.
     """
 
     hole_pitch_m: Positive = 0.01
     hole_radius_m: Annotated[float, Field(gt=0, le=0.05)] = 0.003
+    stiffness_n_per_m: Annotated[float, Field(ge=0.1, le=RIGID_HOLE_N_PER_M)] | None = None
     map: tuple[str, ...]
 
 

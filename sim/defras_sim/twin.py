@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defras_sim.geometry import Pose
-from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene, hole_stiffness_n_per_m
+from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene
 from defras_sim.tissue.model import NothingToGrasp, TissueModel
 from defras_sim.tissue.state import TissueState
 
@@ -137,13 +137,14 @@ class Twin:
         return self._state
 
     def _at_once(self, before: Mask, after: Mask) -> bool:
-        self._model.set_hole_stiffness(hole_stiffness_n_per_m(after))
+        self._model.set_hole_stiffness(self._scene.hole_stiffness_n_per_m(after))
         return self._model.solve(self._tips).converged
 
     def _ramp(self, before: Mask, after: Mask) -> bool:
         """Let the changed holes hold (or give way) little by little."""
-        for rising, falling in zip(_RAMP_N_PER_M, _RAMP_N_PER_M[::-1], strict=True):
-            stiffness = hole_stiffness_n_per_m(before & after)
+        ramp_n_per_m = np.minimum(_RAMP_N_PER_M, self._scene.hold_n_per_m)
+        for rising, falling in zip(ramp_n_per_m, ramp_n_per_m[::-1], strict=True):
+            stiffness = self._scene.hole_stiffness_n_per_m(before & after)
             stiffness[after & ~before] = rising
             stiffness[before & ~after] = falling
             self._model.set_hole_stiffness(stiffness)
@@ -153,7 +154,7 @@ class Twin:
 
     def _repeat_motion(self, before: Mask, after: Mask) -> bool:
         """Start from the resting tissue and take every grasp again, in order."""
-        self._model.set_hole_stiffness(hole_stiffness_n_per_m(after))
+        self._model.set_hole_stiffness(self._scene.hole_stiffness_n_per_m(after))
         self._model.reset()
         for grip in self._grips:
             self._model.solve(grip.others)

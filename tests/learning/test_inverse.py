@@ -13,7 +13,7 @@ from defras_bt.learning.inverse import InverseEstimator
 from defras_bt.learning.replay import Replay
 from defras_bt.monitoring.local import LocalMetric
 from defras_bt.monitoring.seen import seen_surface
-from defras_sim.scene import Scene, hole_stiffness_n_per_m
+from defras_sim.scene import Scene
 
 Record = Callable[[int], list[Keyframe]]
 
@@ -24,7 +24,7 @@ def estimate(belief: Scene, frames: list[Keyframe], seed: int = 0) -> Attachment
 
 def worst_place_m(scene: Scene, attached: np.ndarray, frames: list[Keyframe]) -> float:
     """The local discrepancy of the newest frame."""
-    state = Replay(scene, frames).repeat(hole_stiffness_n_per_m(attached))[-1]
+    state = Replay(scene, frames).repeat(scene.hole_stiffness_n_per_m(attached))[-1]
     seen = seen_surface(state.surface, scene.depth_camera)
     return LocalMetric().measure(frames[-1].cloud_m, seen).value_m
 

@@ -12,7 +12,7 @@ from defras_bt.learning.misfit import misfit
 from defras_bt.learning.observed_cells import ObservedCells
 from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_sim.geometry import Pose
-from defras_sim.scene import Scene, hole_stiffness_n_per_m
+from defras_sim.scene import Scene
 
 Record = Callable[[int], list[Keyframe]]
 
@@ -21,7 +21,9 @@ def test_residuals_are_signed_and_measured_along_the_direction(
     truth: Scene, record: Record
 ) -> None:
     frame = record(1)[0]
-    surface = Replay(truth, [frame], (4, 4, 1)).repeat(hole_stiffness_n_per_m(truth.attached))[0]
+    surface = Replay(truth, [frame], (4, 4, 1)).repeat(
+        truth.hole_stiffness_n_per_m(truth.attached)
+    )[0]
     inner = frame.cloud_m[np.abs(frame.cloud_m[:, :2]).max(axis=1) < 0.05].copy()
     for height in (0.003, -0.002):
         inner[:, 2] = height
@@ -37,7 +39,7 @@ def test_the_derivative_by_hole_forces_agrees_with_small_springs(
     """Attaching a free hole softly pulls on it with stiffness times stretch."""
     frames = record(1)
     scene = belief_without_patch
-    free = hole_stiffness_n_per_m(scene.attached)
+    free = scene.hole_stiffness_n_per_m(scene.attached)
     replay = Replay(scene, frames, (6, 6, 1))
     state = replay.repeat(free)[-1]
     hole, soft = 5 * 12 + 8, 0.01
@@ -71,4 +73,4 @@ def test_a_grasp_off_the_tissue_cannot_be_repeated(truth: Scene, record: Record)
     above = Pose(np.array([0.0, 0.0, 0.05]))
     off = Keyframe(0.0, {"psm1": above}, {"psm1": above}, frame.cloud_m)
     with pytest.raises(NotRepeatable, match="grasp of psm1"):
-        Replay(truth, [off], (4, 4, 1)).repeat(hole_stiffness_n_per_m(truth.attached))
+        Replay(truth, [off], (4, 4, 1)).repeat(truth.hole_stiffness_n_per_m(truth.attached))

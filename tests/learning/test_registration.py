@@ -10,14 +10,14 @@ from defras_bt.learning.estimate import Keyframe
 from defras_bt.learning.registration import fitted_registration
 from defras_bt.learning.replay import Replay
 from defras_sim.geometry import Pose
-from defras_sim.scene import Scene, hole_stiffness_n_per_m
+from defras_sim.scene import Scene
 
 
 def test_a_shift_and_a_turn_are_undone(
     truth: Scene, record: Callable[[int], list[Keyframe]]
 ) -> None:
     frames = record(1)
-    states = Replay(truth, frames, (6, 6, 1)).repeat(hole_stiffness_n_per_m(truth.attached))
+    states = Replay(truth, frames, (6, 6, 1)).repeat(truth.hole_stiffness_n_per_m(truth.attached))
     wrong = Pose(np.zeros(3)).moved(np.array([0.001, -0.001, 0.004]), np.array([0.02, 0.0, 0.0]))
     surfaces = [state.surface for state in states]
     clouds = [wrong.apply(frame.cloud_m) for frame in frames]
@@ -34,7 +34,9 @@ def test_nothing_in_the_picture_is_none(
     truth: Scene, record: Callable[[int], list[Keyframe]]
 ) -> None:
     frame = record(1)[0]
-    state = Replay(truth, [frame], (4, 4, 1)).repeat(hole_stiffness_n_per_m(truth.attached))[0]
+    state = Replay(truth, [frame], (4, 4, 1)).repeat(truth.hole_stiffness_n_per_m(truth.attached))[
+        0
+    ]
     away = truth.depth_camera.model_copy(update={"position_m": (0.17, 5.0, 0.2)})
     turned = away.model_copy(update={"target_m": (0.17, 9.0, 0.2)})
     assert fitted_registration([frame.cloud_m], [state.surface], turned) is None

@@ -13,7 +13,7 @@ from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_bt.learning.search import AttachmentSearch
 from defras_sim.camera.depth import depth_cloud_m
 from defras_sim.camera.ray_caster import RayCaster
-from defras_sim.scene import Scene, hole_stiffness_n_per_m
+from defras_sim.scene import Scene
 
 MESH = (6, 6, 1)
 
@@ -22,7 +22,7 @@ MESH = (6, 6, 1)
 def frames(truth: Scene, record: Callable[[int], list[Keyframe]]) -> list[Keyframe]:
     """Two frames whose clouds come from the mesh of the search."""
     asked = record(1)[2::2]
-    states = Replay(truth, asked, MESH).repeat(hole_stiffness_n_per_m(truth.attached))
+    states = Replay(truth, asked, MESH).repeat(truth.hole_stiffness_n_per_m(truth.attached))
     rng = np.random.default_rng(0)
     return [
         Keyframe(
@@ -37,7 +37,7 @@ def frames(truth: Scene, record: Callable[[int], list[Keyframe]]) -> list[Keyfra
 
 def searcher(belief: Scene, frames: list[Keyframe]) -> AttachmentSearch:
     replay = Replay(belief, frames, MESH)
-    replay.repeat(hole_stiffness_n_per_m(belief.attached))
+    replay.repeat(belief.hole_stiffness_n_per_m(belief.attached))
     clouds = [frame.cloud_m for frame in frames]
     return AttachmentSearch(belief, replay, clouds, range(len(frames)), SearchSettings())
 

@@ -114,7 +114,12 @@ def test_a_new_belief_changes_the_shape_to_that_of_a_twin_that_always_knew(
     assert np.allclose(back.surface.vertices_m, unlike, atol=2e-4)
 
 
-def test_each_way_of_leading_to_a_new_belief_ends_alike(believed: Scene) -> None:
+@pytest.mark.parametrize("stiffness_n_per_m", [None, 30.0])
+def test_each_way_of_leading_to_a_new_belief_ends_alike(
+    believed: Scene, stiffness_n_per_m: float | None
+) -> None:
+    holes = believed.attachments.model_copy(update={"stiffness_n_per_m": stiffness_n_per_m})
+    believed = believed.model_copy(update={"attachments": holes})
     more = believed.attached.copy()
     more.reshape(12, 12)[9:, 4:] = True
     shapes = []
@@ -122,6 +127,7 @@ def test_each_way_of_leading_to_a_new_belief_ends_alike(believed: Scene) -> None
         twin, tip = lifted(believed)
         assert getattr(twin, way)(believed.attached, more)
         shapes.append(twin._solve({"psm1": tip}))
+        assert twin._model.hole_stiffness_n_per_m.max() == believed.hold_n_per_m
     for shape in shapes:
         assert shape.converged
         gap = shape.surface.vertices_m - shapes[0].surface.vertices_m

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from defras_sim.geometry import Floats
-from defras_sim.scene import Scene, hole_stiffness_n_per_m
+from defras_sim.scene import Scene
 from defras_sim.tissue.mesh import Mesh
 from defras_sim.tissue.springs import ROWS, Springs, SpringTerm, disc_rows
 
@@ -24,7 +24,7 @@ class Holes:
             mesh, scene.holes_xy_m, scene.attachments.hole_radius_m, -scene.tissue.thickness_m
         )
         self.targets_m: Floats = self._rows @ mesh.nodes_m
-        self._springs = self._with_stiffness(hole_stiffness_n_per_m(scene.attached))
+        self._springs = self._with_stiffness(scene.hole_stiffness_n_per_m(scene.attached))
 
     def anchor_at(self, positions_m: Floats) -> None:
         """Hold the tissue from now on where it is when its nodes lie at ``positions_m``."""

@@ -193,6 +193,22 @@ def test_softer_holes_give_way():
     )
 
 
+def test_a_scene_says_how_firmly_its_holes_hold():
+    scene = side_scene()
+    soft = scene.attachments.model_copy(update={"stiffness_n_per_m": 25.0})
+    scene = scene.model_copy(update={"attachments": soft})
+    tissue = TissueModel(scene, elements_xyz=(6, 6, 1))
+    expected = np.where(scene.attached, 25.0, 0.0)
+    np.testing.assert_array_equal(tissue.hole_stiffness_n_per_m, expected)
+    np.testing.assert_array_equal(scene.hole_stiffness_n_per_m(~scene.attached), 25.0 - expected)
+    state = retract(tissue, GRASP, LIFTED)
+    # Each hole pulls with its stiffness times how far the tissue over it was pulled away.
+    holes = tissue.terms["attachments"]
+    moved = (holes.springs.rows @ (state.nodes_m - tissue.mesh.nodes_m))[::3]
+    np.testing.assert_allclose(state.attachment_forces_n, -expected[:, None] * moved, atol=1e-12)
+    assert np.abs(moved[scene.attached]).max() > 1e-4
+
+
 def test_a_hole_that_suddenly_holds_lifted_tissue_is_solved_from_rest():
     tissue = model()
     retract(tissue, GRASP, LIFTED)
