@@ -21,11 +21,12 @@ def away_from_endoscope(scene: Scene) -> Floats:
 def manoeuvre_target_m(scene: Scene, manoeuvre: str, tip_m: Floats) -> Floats:
     """Tip position (3,) at the end of ``pull``, ``move`` or ``fold`` when it starts at ``tip_m``.
 
-    Pull lifts straight up; move goes planarly towards the region of interest, at most over its
-    centre; fold moves away from the endoscope.
+    Pull lifts straight up, to a height over the tissue at rest; move goes planarly towards the
+    region of interest, at most over its centre; fold moves away from the endoscope.
     """
     if manoeuvre == "pull":
-        return np.array([tip_m[0], tip_m[1], scene.motion.pull_height_m])
+        ground_m = float(scene.tissue.shape.upper.at(tip_m[:2])[2])
+        return np.array([tip_m[0], tip_m[1], ground_m + scene.motion.pull_height_m])
     if manoeuvre == "move":
         towards = scene.roi_center_m[:2] - tip_m[:2]
         distance = float(np.linalg.norm(towards))

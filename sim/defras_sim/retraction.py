@@ -119,7 +119,7 @@ class Rehearser:
     def _start(self, point: GraspPoint) -> None:
         self._model.restore(self._rest)
         arm = arm_for(self._scene, point)
-        tip_m = np.array([*self._scene.grasp_xy_m(*point), 0.0])
+        tip_m = self._scene.grasp_point_m(*point)
         self._model.grasp(arm, Pose(tip_m, POINTING_DOWN))
         state = self._model.solve({arm: Pose(tip_m, POINTING_DOWN)})
         hidden = roi_visibility(self._scene, RayCaster(state.surface))

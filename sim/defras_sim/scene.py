@@ -62,8 +62,12 @@ __all__ = [
     "load_scene",
 ]
 
+
 # Nearer to the plane between the arms' sides than this is on it.
 _ON_PLANE_M = 1e-9
+
+# The region of interest lies this far below the tissue.
+UNDER_TISSUE_M = 0.001
 
 
 class Scene(Part):
@@ -106,6 +110,16 @@ class Scene(Part):
         return np.stack([np.tile(x, ny), np.repeat(y, nx)], axis=1)
 
     @property
+    def is_hole(self) -> NDArray[np.bool_]:
+        """Which places (n,) of the grid of holes have tissue over them."""
+        return self.tissue.shape.covers(self.holes_xy_m)
+
+    @property
+    def holes_m(self) -> Floats:
+        """Where the holes (n, 3) meet the tissue's lower face."""
+        return self.tissue.shape.lower.at(self.holes_xy_m)
+
+    @property
     def attached(self) -> NDArray[np.bool_]:
         """Which holes hold (n,), in the order of :attr:`holes_xy_m`."""
         return np.array([mark == "#" for row in reversed(self.attachments.map) for mark in row])
@@ -120,7 +134,7 @@ class Scene(Part):
         return np.where(attached, self.hold_n_per_m, 0.0)
 
     def grasp_xy_m(self, column: int, row: int) -> Floats:
-        """Position (2,) of a grasp point; column and row count from 1."""
+        """Place (2,) of a grasp point seen from above; column and row count from 1."""
         grid, tissue = self.grasp, self.tissue
         return np.array(
             [
@@ -129,11 +143,21 @@ class Scene(Part):
             ]
         )
 
+    def grasp_point_m(self, column: int, row: int) -> Floats:
+        """Position (3,) of a grasp point on the tissue's upper face."""
+        return self.tissue.shape.upper.at(self.grasp_xy_m(column, row))
+
     @property
     def grasp_points(self) -> tuple[GraspPoint, ...]:
-        """All grasp points, row by row from (1, 1)."""
+        """All places of the grid with tissue for a jaw to take, row by row from (1, 1)."""
         grid = self.grasp
-        return tuple((c, r) for r in range(1, grid.rows + 1) for c in range(1, grid.columns + 1))
+        places = [(c, r) for r in range(1, grid.rows + 1) for c in range(1, grid.columns + 1)]
+        if self.tissue.anatomy is None:
+            return tuple(places)
+        room = self.tissue.anatomy.room_m(np.array([self.grasp_xy_m(*place) for place in places]))
+        return tuple(
+            place for place, m in zip(places, room, strict=True) if m >= grid.patch_radius_m
+        )
 
     def arms_at(self, column: int, row: int) -> tuple[ArmName, ...]:
         """The arms on whose side of the x-z plane a grasp point lies; on the plane, all."""
@@ -147,16 +171,40 @@ class Scene(Part):
     @property
     def roi_center_m(self) -> Floats:
         """Centre (3,) of the region of interest, 1 mm below the tissue's lower face."""
-        return np.array(
-            [self.roi.center_x_m, self.roi.center_y_m, -self.tissue.thickness_m - 0.001]
-        )
+        return self.under_tissue_m(np.array([self.roi.center_x_m, self.roi.center_y_m]))
+
+    def under_tissue_m(self, xy_m: Floats) -> Floats:
+        """Points (..., 3) of what lies under the tissue, 1 mm below its lower face at rest."""
+        return self.tissue.shape.lower.at(xy_m) - np.array([0.0, 0.0, UNDER_TISSUE_M])
+
+    @property
+    def lowest_grasp_m(self) -> float:
+        """Height of the lowest grasp point."""
+        return min(float(self.grasp_point_m(*point)[2]) for point in self.grasp_points)
+
+    @property
+    def simulated(self) -> Scene:
+        """The scene with the mesh on which a simulated world imitates it."""
+        tissue = self.tissue
+        if tissue.anatomy is not None:
+            other: dict[str, object] = {"anatomy": tissue.anatomy.taking("actual")}
+        else:
+            other = {"elements_xyz": self.simulation.elements_xyz}
+        return self.model_copy(update={"tissue": tissue.model_copy(update=other)})
 
     def for_bullet(self) -> Scene:
         """The scene with a twin that shares PyBullet's linear tetrahedra and material.
 
         The accurate twin differs from PyBullet by several millimetres in a fold, whatever the
         attachments are; that mismatch belongs to diagnosis, not to the retraction.
+
+        Raises:
+            ValueError: the tissue is no slab.
         """
+        if self.tissue.anatomy is not None:
+            raise ValueError(
+                "PyBullet's world simulates slabs only; a patient's anatomy runs in the model world"
+            )
         shared = {
             "element": "tetrahedron4",
             "elements_xyz": self.simulation.bullet_elements_xyz,
@@ -167,7 +215,8 @@ class Scene(Part):
     def with_attached(self, attached: NDArray[np.bool_]) -> Scene:
         """The same scene with another set of holding holes (n,)."""
         nx, ny = self.hole_counts
-        rows = np.where(np.asarray(attached).reshape(ny, nx)[::-1], "#", ".")
+        marks = np.where(np.asarray(attached), "#", np.where(self.is_hole, ".", " "))
+        rows = marks.reshape(ny, nx)[::-1]
         drawn = tuple("".join(row) for row in rows)
         return self.model_copy(
             update={"attachments": self.attachments.model_copy(update={"map": drawn})}
@@ -185,7 +234,7 @@ def load_scene(file: Path) -> Scene:
         InvalidFile: with every fault as file:line:column.
     """
     source = read_extended(Path(file))
-    scene = source.validate(Scene)
+    scene = source.validate(Scene, context={"folder": Path(file).parent})
     faults = [source.fault(place, message) for place, message in scene_faults(scene)]
     if faults:
         raise InvalidFile(faults)

@@ -44,7 +44,7 @@ def scene_schema() -> dict[str, Any]:
     required = schema.pop("required")
     schema["anyOf"] = [{"required": ["extends"]}, {"required": required}]
     attachments = schema["$defs"]["Attachments"]
-    attachments["properties"]["map"]["items"]["pattern"] = "^[#.]+$"
+    attachments["properties"]["map"]["items"]["pattern"] = "^[#. ]+$"
     return schema
 
 
@@ -66,7 +66,7 @@ def _styled(node: Any) -> Any:
     if isinstance(node, Mapping):
         return CommentedMap({key: _styled(value) for key, value in node.items()})
     if isinstance(node, list):
-        if node and set("".join(map(str, node))) <= {"#", "."}:
+        if node and set("".join(map(str, node))) <= {"#", ".", " "}:
             return CommentedSeq(DoubleQuotedScalarString(row) for row in node)
         styled = CommentedSeq(_styled(item) for item in node)
         if not any(isinstance(item, (Mapping, list)) for item in node):

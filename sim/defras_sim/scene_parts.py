@@ -10,6 +10,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from defras_sim.anatomy.anatomy import Anatomy
+from defras_sim.rest_shape import RestShape, Slab
+
 Positive = Annotated[float, Field(gt=0)]
 Coordinate = Annotated[float, Field(ge=-2, le=2)]
 """Of something in the operating theatre, in metres from the tissue's centre."""
@@ -37,12 +40,16 @@ class Part(BaseModel):
 
 
 class Tissue(Part):
-    """The slab, its material, and the finite-element mesh the twin uses for it.
+    """The tissue's shape and material, and the finite-element mesh the twin uses for it.
+
+    A slab, unless there is an ``anatomy`` (``defras scene from-mesh``): then length and width are
+    those of the box around it, and it has its own meshes of ``tetrahedron10``.
 
     ``bed``: whether a rigid, frictionless bed lies right under it. Gravity pulls along -z; the
     paper's scenes have none.
     """
 
+    anatomy: Anatomy | None = None
     length_x_m: Side = 0.12
     width_y_m: Side = 0.12
     thickness_m: Side = 0.005
@@ -55,13 +62,18 @@ class Tissue(Part):
     elements_xyz: tuple[int, int, int] = (8, 8, 1)
     bed: bool = True
 
+    @property
+    def shape(self) -> RestShape:
+        """The tissue at rest."""
+        return self.anatomy or Slab(self.length_x_m, self.width_y_m, self.thickness_m)
+
 
 class Attachments(Part):
     """Holes of the lower face and which of them hold the tissue.
 
     ``map`` is drawn as seen from above: first row at largest y, first column at smallest x;
-    ``#`` holds, ``.`` is free. ``stiffness_n_per_m`` is how firmly each of them holds; without it
-    they are rigid.
+    ``#`` holds, ``.`` is free, a blank is a place without tissue over it. ``stiffness_n_per_m`` is
+    how firmly each of them holds; without it they are rigid.
     """
 
     hole_pitch_m: Positive = 0.01

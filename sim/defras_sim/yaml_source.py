@@ -58,14 +58,14 @@ class YamlSource:
             where = where[:-1]
         return Fault(*self.places.get(where, (self.file, 1, 1)), message)
 
-    def validate(self, model: type[Model]) -> Model:
-        """Check the data against ``model``.
+    def validate(self, model: type[Model], context: Mapping[str, Any] | None = None) -> Model:
+        """Check the data against ``model``, which may look into ``context``.
 
         Raises:
             InvalidFile: with one fault for each thing pydantic objects to.
         """
         try:
-            return model.model_validate(self.data)
+            return model.model_validate(self.data, context=context)
         except ValidationError as error:
             raise InvalidFile(
                 self.fault(item["loc"], _worded(model, item)) for item in error.errors()

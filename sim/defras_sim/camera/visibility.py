@@ -27,8 +27,7 @@ def unit_disc(samples: int) -> Floats:
 
 def roi_points_m(scene: Scene, samples: int = ROI_SAMPLES) -> Floats:
     """Points (samples, 3) spread evenly over the region of interest."""
-    flat = scene.roi.radius_m * unit_disc(samples)
-    return scene.roi_center_m + np.column_stack([flat, np.zeros(samples)])
+    return scene.under_tissue_m(scene.roi_center_m[:2] + scene.roi.radius_m * unit_disc(samples))
 
 
 def roi_visibility(scene: Scene, tissue: RayCaster) -> float:

@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.spatial.transform import Rotation
 
 from defras_sim.geometry import Floats, Pose
+from defras_sim.rest_shape import Face
 from defras_sim.surface import Surface
 from defras_sim.tissue.mesh import Integers, Mesh, SlabMesh
 from defras_sim.tissue.springs import ROW_SHIFTS, Springs, SpringTerm, disc_rows
@@ -75,11 +76,16 @@ def term_name(arm: str) -> str:
 
 
 def grasped_patch(
-    mesh: Mesh, positions_m: Floats, center_xy_m: Floats, radius_m: float, tissue_from_tip: Pose
+    mesh: Mesh,
+    upper: Face,
+    positions_m: Floats,
+    center_xy_m: Floats,
+    radius_m: float,
+    tissue_from_tip: Pose,
 ) -> Grasp:
     """Hold the disc around rest position ``center_xy_m`` (2,) of the upper face as it lies now.
 
-    The disc is moved inwards where it would reach over the slab's edge. Linear tetrahedra are held
+    The disc is moved inwards where it would reach over the rim. Linear tetrahedra are held
     by whole nodes instead, as PyBullet holds them.
     """
     if isinstance(mesh, SlabMesh) and mesh.element == "tetrahedron4":
@@ -87,9 +93,8 @@ def grasped_patch(
         rows = sparse.csr_array(sparse.eye_array(len(mesh.nodes_m), format="csr")[nodes])
         shifts = np.ones(len(nodes))
     else:
-        half = np.ptp(mesh.nodes_m, axis=0)[:2] / 2
-        center = np.clip(center_xy_m, radius_m - half, half - radius_m)
-        rows, shifts = disc_rows(mesh, center[None], radius_m, 0.0), ROW_SHIFTS
+        center = upper.inset(center_xy_m, radius_m)
+        rows, shifts = disc_rows(mesh, center[None], radius_m, upper), ROW_SHIFTS
     held = rows @ positions_m
     from_tip = held - shifts[:, None] * tissue_from_tip.position_m
     springs = Springs(rows, np.full(len(shifts), GRASP_N_PER_M))
@@ -126,25 +131,23 @@ def _patch_motion(rest_m: Floats, now_m: Floats) -> Pose:
 
 
 def nearest_on_upper_face(
-    mesh: Mesh, positions_m: Floats, surface: Surface, tip_m: Floats
+    mesh: Mesh, upper: Face, positions_m: Floats, surface: Surface, tip_m: Floats
 ) -> Floats:
     """Rest position (2,) of the point of the upper face that now lies nearest to the tip.
 
     Raises:
         NothingToGrasp: it is farther than 8 mm from the tip.
     """
-    upper = surface.vertices_m[surface.upper]
-    best = surface.rest_xy_m[surface.upper][np.argmin(np.linalg.norm(upper - tip_m, axis=1))]
-    half = np.ptp(mesh.nodes_m, axis=0)[:2] / 2
+    seen = surface.vertices_m[surface.upper]
+    best = surface.rest_xy_m[surface.upper][np.argmin(np.linalg.norm(seen - tip_m, axis=1))]
     width, gap = 0.004, np.inf
     for _ in range(8):  # halve a grid around the nearest vertex, down to 0.03 mm
         line = np.linspace(-width, width, 5)
         around = best + np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
-        around = np.clip(around, -half, half)
-        rest = np.column_stack([around, np.zeros(len(around))])
+        rest = upper.at(around)
         distances = np.linalg.norm(mesh.interpolation(rest) @ positions_m - tip_m, axis=1)
         nearest = int(np.argmin(distances))
-        best, gap = around[nearest], float(distances[nearest])
+        best, gap = rest[nearest, :2], float(distances[nearest])
         width /= 2
     if gap > GRASP_REACH_M:
         raise NothingToGrasp(

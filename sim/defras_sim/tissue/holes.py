@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import sparse
 
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
@@ -20,9 +21,16 @@ class Holes:
     """
 
     def __init__(self, mesh: Mesh, scene: Scene) -> None:
-        self._rows = disc_rows(
-            mesh, scene.holes_xy_m, scene.attachments.hole_radius_m, -scene.tissue.thickness_m
+        self._is_hole = scene.is_hole
+        rows = disc_rows(
+            mesh,
+            scene.holes_xy_m[self._is_hole],
+            scene.attachments.hole_radius_m,
+            scene.tissue.shape.lower,
         )
+        # Places of the grid without tissue hold nothing: their rows are empty.
+        places = sparse.eye_array(ROWS * len(self._is_hole), format="csc")
+        self._rows = sparse.csr_array(places[:, np.repeat(self._is_hole, ROWS)] @ rows)
         self.targets_m: Floats = self._rows @ mesh.nodes_m
         self._springs = self._with_stiffness(scene.hole_stiffness_n_per_m(scene.attached))
 
@@ -45,6 +53,8 @@ class Holes:
             )
         if not np.all(np.isfinite(stiffness) & (stiffness >= 0)):
             raise ValueError("hole stiffness should be finite and at least 0 N/m")
+        if np.any(stiffness[~self._is_hole] > 0):
+            raise ValueError("a hole without tissue over it cannot hold; its stiffness should be 0")
         self._springs = self._with_stiffness(stiffness)
 
     @property

@@ -20,7 +20,7 @@ from defras_sim.tissue.hole_response import HoleResponse, hole_response
 from defras_sim.tissue.holes import Holes
 from defras_sim.tissue.loads import gravity
 from defras_sim.tissue.materials import lame_parameters
-from defras_sim.tissue.mesh import Integers, slab_mesh
+from defras_sim.tissue.mesh import Integers
 from defras_sim.tissue.parameters import Parameter
 from defras_sim.tissue.path import length_m
 from defras_sim.tissue.readout import tissue_state
@@ -30,6 +30,7 @@ from defras_sim.tissue.solver import NewtonSettings, NewtonSolver, factorised
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.surface import surface_map
 from defras_sim.tissue.terms import Term
+from defras_sim.tissue.tissue_mesh import tissue_mesh
 from defras_sim.tissue.travel import Tips, Traveller
 
 __all__ = ["NothingToGrasp", "TissueModel", "TissueSnapshot"]
@@ -66,7 +67,7 @@ class TissueModel:
     ) -> None:
         tissue = scene.tissue
         self.scene = scene
-        self.mesh = slab_mesh(
+        self.mesh = tissue_mesh(
             tissue, element or tissue.element, elements_xyz or tissue.elements_xyz
         )
         name = material or tissue.material
@@ -173,12 +174,13 @@ class TissueModel:
         if arm in self._grasps:
             raise ValueError(f"{arm} holds tissue already; release it first")
         surface = self._surface.surface(self._positions_m)
+        upper = self.scene.tissue.shape.upper
         center = grips.nearest_on_upper_face(
-            self.mesh, self._positions_m, surface, tissue_from_tip.position_m
+            self.mesh, upper, self._positions_m, surface, tissue_from_tip.position_m
         )
         radius = self.scene.grasp.patch_radius_m
         self._grasps[arm] = grips.grasped_patch(
-            self.mesh, self._positions_m, center, radius, tissue_from_tip
+            self.mesh, upper, self._positions_m, center, radius, tissue_from_tip
         )
         self._changed()
 

@@ -16,6 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from defras_sim.geometry import Floats
+from defras_sim.rest_shape import Face
 from defras_sim.tissue.layout import Places, add_scalars
 from defras_sim.tissue.mesh import Integers, Mesh
 from defras_sim.tissue.terms import unknown_parameter
@@ -110,18 +111,17 @@ class SpringTerm:
         return self.energy_and_gradient(positions_m)[1]
 
 
-def disc_rows(
-    mesh: Mesh, centers_xy_m: Floats, radius_m: float, height_m: float
-) -> sparse.csr_array:
-    """Rows (3 discs, nodes) of discs around ``centers_xy_m`` (discs, 2) at height z.
+def disc_rows(mesh: Mesh, centers_xy_m: Floats, radius_m: float, face: Face) -> sparse.csr_array:
+    """Rows (3 discs, nodes) of discs around ``centers_xy_m`` (discs, 2) on ``face``.
 
-    A disc that reaches over the slab's edge is squeezed into the slab.
+    A disc lies in the face's tangent plane there, brought onto the face along z; one that reaches
+    over the rim is squeezed into the face.
     """
-    xy = np.asarray(centers_xy_m, dtype=float)[:, None, :] + radius_m * _POINTS
-    points = np.concatenate([xy, np.full((*xy.shape[:2], 1), height_m)], axis=2).reshape(-1, 3)
-    box = mesh.nodes_m.min(axis=0), mesh.nodes_m.max(axis=0)
-    moments = sparse.kron(sparse.eye_array(len(xy)), _MOMENTS, format="csr")
-    return sparse.csr_array(moments @ mesh.interpolation(np.clip(points, *box)))
+    centers = np.asarray(centers_xy_m, dtype=float)
+    spread = _POINTS @ face.tangents(centers)[..., :2]  # (discs, 7, 2)
+    points = face.at(centers[:, None, :] + radius_m * spread).reshape(-1, 3)
+    moments = sparse.kron(sparse.eye_array(len(centers)), _MOMENTS, format="csr")
+    return sparse.csr_array(moments @ mesh.interpolation(points))
 
 
 def net_force(forces_n: Floats) -> Floats:

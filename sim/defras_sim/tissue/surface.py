@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from defras_sim.anatomy.anatomy import Anatomy
 from defras_sim.geometry import Floats
 from defras_sim.scene import Tissue
 from defras_sim.surface import Surface
@@ -22,7 +23,8 @@ SQUARES = 24  # along each side of the upper and the lower face
 
 @dataclass(frozen=True)
 class SurfaceMap:
-    """``from_nodes`` (vertices, nodes) interpolates; upper vertices come first, then lower ones."""
+    """``from_nodes`` (vertices, nodes) interpolates the vertices of ``triangles``. ``upper`` marks
+    those of the upper face; ``rest_xy_m`` (vertices, 2) is where they lie at rest."""
 
     from_nodes: sparse.csr_array
     triangles: Integers
@@ -36,7 +38,21 @@ class SurfaceMap:
 
 
 def surface_map(mesh: Mesh, tissue: Tissue) -> SurfaceMap:
-    """The slab's surface: both faces as a grid of squares, joined by one row of side squares."""
+    """The surface of a scene's tissue on any of its meshes."""
+    return _slab_map(mesh, tissue) if tissue.anatomy is None else _map(mesh, tissue.anatomy)
+
+
+def _map(mesh: Mesh, anatomy: Anatomy) -> SurfaceMap:
+    upper = np.zeros(len(anatomy.vertices_m), dtype=bool)
+    upper[anatomy.triangles[anatomy.side == 1]] = True
+    vertices_m = anatomy.vertices_m
+    return SurfaceMap(
+        mesh.interpolation(vertices_m), anatomy.triangles, upper, vertices_m[:, :2].copy()
+    )
+
+
+def _slab_map(mesh: Mesh, tissue: Tissue) -> SurfaceMap:
+    """Both faces as a grid of squares, joined by one row of side squares."""
     count = SQUARES + 1
     x = np.linspace(-tissue.length_x_m / 2, tissue.length_x_m / 2, count)
     y = np.linspace(-tissue.width_y_m / 2, tissue.width_y_m / 2, count)

@@ -31,7 +31,7 @@ TIP_NOISE_SD_M = 2e-5
 
 
 class ModelWorld:
-    """A quasi-static reality for a scene, on the mesh ``scene.simulation.elements_xyz``.
+    """A quasi-static reality for a scene, on the mesh of ``scene.simulated``.
 
     Equal scenes, commands and generators give equal runs.
     """
@@ -49,7 +49,7 @@ class ModelWorld:
         self._tools = {
             arm: KinematicTool.at(np.array(part.home_tip_m)) for arm, part in scene.arms.items()
         }
-        self._model = TissueModel(scene, elements_xyz=scene.simulation.elements_xyz)
+        self._model = TissueModel(scene.simulated)
         self._state = self._model.solve({})
         if not self._state.converged:
             raise WorldError("the tissue finds no equilibrium at rest")

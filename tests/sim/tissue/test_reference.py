@@ -64,7 +64,9 @@ def test_a_disc_held_by_interpolation_hardly_depends_on_the_mesh():
     found = []
     for cells in ((8, 8, 1), (12, 12, 1)):
         body = slab_body("hexahedron20", cells)
-        held = Springs(disc_rows(body.mesh, np.zeros((1, 2)), 0.010, 0.0), np.full(3, 1e4))
+        held = Springs(
+            disc_rows(body.mesh, np.zeros((1, 2)), 0.010, Tissue().shape.upper), np.full(3, 1e4)
+        )
         found.append(lift_forces(body, held, ROW_SHIFTS, [0.01, 0.02]))
     np.testing.assert_allclose(found[0], found[1], rtol=0.10)
     np.testing.assert_allclose(found[1], [0.0120, 0.0542], rtol=0.20)

@@ -9,6 +9,8 @@ from defras_sim.tissue.springs import Springs, SpringTerm, disc_rows, joined, ne
 
 CENTER = np.array([[0.011, -0.02]])
 
+SLAB = Tissue().shape
+
 
 def slab(cells=(8, 8, 1)):
     return slab_mesh(Tissue(), "hexahedron20", cells)
@@ -17,7 +19,7 @@ def slab(cells=(8, 8, 1)):
 def test_moments_of_a_disc_are_exact():
     mesh = slab()
     x = mesh.nodes_m
-    rows = disc_rows(mesh, CENTER, 0.004, 0.0)
+    rows = disc_rows(mesh, CENTER, 0.004, SLAB.upper)
     # Over a disc of radius r, the mean of 2 (x - x0) / r times x is r / 2.
     expected = [[0.011, -0.02, 0.0], [0.002, 0.0, 0.0], [0.0, 0.002, 0.0]]
     np.testing.assert_allclose(rows @ x, expected, atol=1e-15)
@@ -26,7 +28,7 @@ def test_moments_of_a_disc_are_exact():
 @pytest.mark.parametrize("cells", [(8, 8, 1), (12, 12, 1), (5, 7, 2)])
 def test_a_disc_pulls_and_turns_with_its_stiffness_whatever_the_mesh(cells):
     mesh = slab(cells)
-    rows = disc_rows(mesh, CENTER, 0.005, 0.0)
+    rows = disc_rows(mesh, CENTER, 0.005, SLAB.upper)
     springs = Springs(rows, np.full(3, 500.0))
     about = np.array([*CENTER[0], 0.0])
     angle = 1e-6
@@ -41,7 +43,7 @@ def test_a_disc_pulls_and_turns_with_its_stiffness_whatever_the_mesh(cells):
 
 
 def test_a_disc_at_the_edge_stays_in_the_slab():
-    rows = disc_rows(slab(), np.array([[0.06, 0.06]]), 0.005, -0.005)
+    rows = disc_rows(slab(), np.array([[0.06, 0.06]]), 0.005, SLAB.lower)
     np.testing.assert_allclose(rows.sum(axis=1), [1, 0, 0], atol=1e-12)
 
 
@@ -49,8 +51,8 @@ def test_gradient_and_tangent_are_slopes():
     mesh = slab((4, 4, 1))
     springs = joined(
         [
-            Springs(disc_rows(mesh, CENTER, 0.004, 0.0), np.full(3, 300.0)),
-            Springs(disc_rows(mesh, -CENTER, 0.004, -0.005), np.full(3, 1e4)),
+            Springs(disc_rows(mesh, CENTER, 0.004, SLAB.upper), np.full(3, 300.0)),
+            Springs(disc_rows(mesh, -CENTER, 0.004, SLAB.lower), np.full(3, 1e4)),
         ]
     )
     rng = np.random.default_rng(0)
