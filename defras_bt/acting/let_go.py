@@ -60,6 +60,7 @@ class LetGo(RecoveryLeaf):
     """
 
     remedy: ClassVar[Remedy] = Remedy.LET_GO
+    opens_jaws: ClassVar[bool] = True
 
     def initialise(self) -> None:
         self._started_s = self.context.board.inputs.time_s

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import py_trees
 from py_trees.common import Status
@@ -48,6 +48,10 @@ class Node(py_trees.behaviour.Behaviour):
     a guard pre-empts it. ``terminate()`` must never command motion: a pre-empted action is
     terminated *after* the branch that took over was ticked, so it would have the last word.
 
+    What a proof about a tree may count on is declared, too: ``answers``, all that ``update()`` ever
+    reports; ``opens_jaws``, for a leaf that commands jaws although it is no motion; and
+    :meth:`promise`.
+
     Attributes:
         code: reason of the last status, for counting and recovery: a member of
             :class:`~defras_bt.executive.reasons.Code`, or of a package's own ``ReasonCode``.
@@ -58,6 +62,19 @@ class Node(py_trees.behaviour.Behaviour):
 
     role: ClassVar[Role]
     Parameters: ClassVar[type[BaseModel]] = NoParameters
+    answers: ClassVar[frozenset[Status]] = frozenset(
+        {Status.SUCCESS, Status.FAILURE, Status.RUNNING}
+    )
+    opens_jaws: ClassVar[bool] = False
+
+    @classmethod
+    def promise(cls, parameters: Any, variable: str, value: str) -> Status | None:
+        """What a leaf with these parameters surely answers in a tick; None: anything.
+
+        ``variable`` has ``value`` in that tick; :data:`~defras_bt.executive.dangers.WORLD` lists
+        them. A guard that promises FAILURE in a danger is one that a tree can be proved with.
+        """
+        return None
 
     def __init__(self, name: str, context: Context, parameters: BaseModel) -> None:
         super().__init__(name)
@@ -104,6 +121,12 @@ class Node(py_trees.behaviour.Behaviour):
             raise ValueError(f"{type(self).__name__}: code {code!r} should be snake_case")
         if not message:
             raise ValueError(f"{type(self).__name__}: code {code!r} needs a message for people")
+        if status not in self.answers:
+            known = ", ".join(sorted(answer.name for answer in self.answers))
+            raise ValueError(
+                f"{type(self).__name__}: code {code!r} comes with {status.name}, but its "
+                f"`answers` are {known}: trees were proved with those"
+            )
         self.code, self.feedback_message = code, message
         self.reported_status, self._reported = status, True
         return status

@@ -105,6 +105,8 @@ class Finish(Task):
 class AskHuman(Task):
     """Stop, keep the grip, and ask a human to take over."""
 
+    answers: ClassVar[frozenset[Status]] = frozenset({Status.SUCCESS})
+
     def update(self) -> Status:
         board, why = self.context.board, self._why()
         sentence = f"Motion stopped, a human is asked to take over: {why.message}."

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from py_trees.common import Status
 from pydantic import Field
 
+from defras_bt.executive.dangers import LONGEST_PATIENCE_S
 from defras_bt.executive.node import Node, NodeParameters, Role
 from defras_bt.executive.reasons import Code
 from defras_bt.executive.registry import register_node
@@ -17,6 +18,10 @@ class Guard(Node):
     """Base of the guards."""
 
     role: ClassVar[Role] = "guard"
+
+
+def _if(permitted: bool) -> Status:
+    return Status.SUCCESS if permitted else Status.FAILURE
 
 
 class StateParameters(NodeParameters):
@@ -41,6 +46,10 @@ class TravelParameters(NodeParameters):
 class SensorsFresh(Guard):
     """Succeeds if every reading is there, a number, and young enough."""
 
+    @classmethod
+    def promise(cls, parameters: Any, variable: str, value: str) -> Status | None:
+        return _if(value == "fresh") if variable == "readings" else None
+
     def update(self) -> Status:
         missing = self.context.board.inputs.missing
         if missing:
@@ -51,6 +60,10 @@ class SensorsFresh(Guard):
 @register_node
 class OperatorPermits(Guard):
     """Succeeds unless the operator asked to stop, or refused a plan."""
+
+    @classmethod
+    def promise(cls, parameters: Any, variable: str, value: str) -> Status | None:
+        return Status.FAILURE if (variable, value) == ("operator", "stops") else None
 
     def update(self) -> Status:
         board = self.context.board
@@ -68,6 +81,12 @@ class WarningBelow(Guard):
     Parameters = StateParameters
     parameters: StateParameters
 
+    @classmethod
+    def promise(cls, parameters: Any, variable: str, value: str) -> Status | None:
+        if variable != "warning":
+            return None
+        return _if(value != "unknown" and int(value) < parameters.state)
+
     def update(self) -> Status:
         state = self.context.board.warning_state
         if state is None:
@@ -84,6 +103,12 @@ class WarningReached(Guard):
     Parameters = StateParameters
     parameters: StateParameters
 
+    @classmethod
+    def promise(cls, parameters: Any, variable: str, value: str) -> Status | None:
+        if variable != "warning":
+            return None
+        return _if(value != "unknown" and int(value) >= parameters.state)
+
     def update(self) -> Status:
         state = self.context.board.warning_state
         if state is None or state < self.parameters.state:
@@ -99,6 +124,11 @@ class ForceAccepted(Guard):
 
     Parameters = PatienceParameters
     parameters: PatienceParameters
+
+    @classmethod
+    def promise(cls, parameters: Any, variable: str, value: str) -> Status | None:
+        notices = parameters.patience_s <= LONGEST_PATIENCE_S
+        return Status.FAILURE if (variable, value) == ("force", "dangerous") and notices else None
 
     def update(self) -> Status:
         board = self.context.board

@@ -40,6 +40,15 @@ def test_what_was_said_outlives_preemption():
     assert (node.code, node.feedback_message) == ("moving", "3 mm to go")
 
 
+def test_an_answer_that_the_proofs_do_not_reckon_with_is_refused():
+    class Certain(Told):
+        answers = frozenset({Status.SUCCESS})
+
+    assert Certain(lambda node: node.succeed("done", "done")).update() == Status.SUCCESS
+    with pytest.raises(ValueError, match="comes with FAILURE, but its `answers` are SUCCESS"):
+        Certain(lambda node: node.fail("stuck", "stuck")).tick_once()
+
+
 def test_a_status_without_a_reason_is_refused():
     with pytest.raises(UnreportedStatus, match=r"Told 'told' .*self\.succeed"):
         Told(lambda node: Status.SUCCESS).tick_once()

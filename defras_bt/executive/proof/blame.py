@@ -11,7 +11,7 @@ from py_trees.common import Status
 from defras_bt.executive.proof.claims import Claim
 from defras_bt.executive.proof.facts import Numbered
 from defras_bt.executive.proof.guards import Condition, condition, guarding
-from defras_bt.executive.proof.promises import PROMISES
+from defras_bt.executive.proof.promises import promise
 from defras_bt.executive.proof.trace import Trace, TracedTick
 from defras_bt.executive.tree_decorators import DECORATORS
 
@@ -121,10 +121,7 @@ def _unheard(root: Numbered, way: list[Numbered], tick: TracedTick, claim: Claim
 
 def _knows(node: Numbered, claim: Claim) -> bool:
     """Whether a leaf answers something definite in the danger of ``claim``."""
-    if node.spec is None or node.spec.node_class is None or claim.danger is None:
-        return False
-    promise = PROMISES.get((node.spec.kind, claim.danger[0]))
-    return promise is not None and promise(node.spec.options, claim.danger[1]) is not None
+    return claim.danger is not None and promise(node, *claim.danger) is not None
 
 
 def _unguarded(way: list[Numbered], claim: Claim) -> Blame:
@@ -134,9 +131,8 @@ def _unguarded(way: list[Numbered], claim: Claim) -> Blame:
     if claim.danger is None:
         return Blame(node, "no guard stands before what moves there")
     variable, value = claim.danger
-    asked = sorted(name for name, about in PROMISES if about == variable)
     return Blame(
         node,
         f"no guard before {way[-1].path} asks about this ({variable} {value}) so that it would "
-        f"stop it; leaves that ask: {', '.join(asked)}",
+        "stop it",
     )

@@ -1,4 +1,4 @@
-"""What is claimed of every tree, and what it says about the world."""
+"""What is claimed of every tree."""
 
 from __future__ import annotations
 
@@ -6,16 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-WORLD: dict[str, tuple[str, ...]] = {
-    "readings": ("fresh", "missing"),
-    "operator": ("silent", "stops"),
-    "force": ("tolerable", "dangerous"),
-    "warning": ("0", "1", "2", "3", "unknown"),
-}
-"""What leaves may ask about in a tick, and what it may be. It is the same for all leaves of a tick.
-
-The force is dangerous where it is unknown or was over its threshold for a second without a break.
-"""
+from defras_bt.executive.dangers import WORLD
 
 
 @dataclass(frozen=True)

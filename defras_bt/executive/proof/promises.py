@@ -1,67 +1,25 @@
 """What leaves promise about their answers, so that the proof may count on it.
 
-Without a promise a leaf may answer anything in any tick. Each promise made here is kept against the
-leaf itself by a test.
+Without a promise a leaf may answer anything in any tick. Promises stand in the classes of the
+leaves; a test keeps those of the built-in ones against the leaves themselves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 from py_trees.common import Status
 
-from defras_bt.executive.proof.claims import WORLD
+from defras_bt.executive.dangers import WORLD
+from defras_bt.executive.node import Node
 from defras_bt.executive.proof.facts import LETTERS, Numbered
-from defras_bt.executive.tree_spec import NodeSpec
-
-S, F, R = Status.SUCCESS, Status.FAILURE, Status.RUNNING
-
-Promise = Callable[[Any, str], Status | None]
-"""Answer of a leaf with these parameters where a variable of the world has this value."""
-
-LONGEST_PATIENCE_S = 1.0
-"""From then on a force over its threshold is dangerous, and no guard may be patient any more."""
 
 
-def _below(parameters: Any, warning: str) -> Status | None:
-    return S if warning != "unknown" and int(warning) < parameters.state else F
-
-
-def _reached(parameters: Any, warning: str) -> Status | None:
-    return S if warning != "unknown" and int(warning) >= parameters.state else F
-
-
-def _force(parameters: Any, force: str) -> Status | None:
-    impatient = parameters.patience_s <= LONGEST_PATIENCE_S
-    return F if force == "dangerous" and impatient else None
-
-
-PROMISES: Mapping[tuple[str, str], Promise] = {
-    ("SensorsFresh", "readings"): lambda _, value: S if value == "fresh" else F,
-    ("OperatorPermits", "operator"): lambda _, value: F if value == "stops" else None,
-    ("ForceAccepted", "force"): _force,
-    ("WarningBelow", "warning"): _below,
-    ("WarningReached", "warning"): _reached,
-}
-"""By class and variable of the world. None: the leaf may answer anything."""
-
-ALWAYS: Mapping[str, frozenset[Status]] = {"AskHuman": frozenset({S})}
-"""All that leaves of a class ever answer; those not named here may answer anything."""
-
-COMMANDING = frozenset({"LetGo"})
-"""Classes that command an arm without moving it: their role is not motion, but they open a jaw."""
-
-
-def may_answer(spec: NodeSpec | None) -> frozenset[Status]:
-    """What a leaf may answer at all; ``spec`` is None for an action of a plan."""
-    anything = frozenset({S, F, R})
-    return anything if spec is None else ALWAYS.get(spec.kind, anything)
-
-
-def commands(node: Numbered) -> bool:
-    """Whether a leaf may propose any command, opening a jaw included."""
-    return node.moves or (node.spec is not None and node.spec.kind in COMMANDING)
+def promise(node: Numbered, variable: str, value: str) -> Status | None:
+    """What a leaf surely answers where a variable of the world has this value; None: anything."""
+    if node.spec is None or node.spec.node_class is None:
+        return None
+    return node.spec.node_class.promise(node.spec.options, variable, value)
 
 
 def leaf_facts(root: Numbered) -> Iterator[str]:
@@ -69,19 +27,16 @@ def leaf_facts(root: Numbered) -> Iterator[str]:
     for node in root.walk():
         if not node.is_leaf:
             continue
-        yield from (f"may({node.number},{LETTERS[s]})." for s in may_answer(node.spec))
+        # An action of a plan stands in no file; it may answer whatever any leaf may.
+        leaf = Node if node.spec is None or node.spec.node_class is None else node.spec.node_class
+        yield from (f"may({node.number},{LETTERS[status]})." for status in leaf.answers)
         if node.moves:
             yield f"moves({node.number})."
-        if commands(node):
+        if node.moves or leaf.opens_jaws:
             yield f"commands({node.number})."
-        if node.spec is not None:
-            yield from _promise_facts(node.number, node.spec)
-
-
-def _promise_facts(number: int, spec: NodeSpec) -> Iterator[str]:
-    for variable, values in WORLD.items():
-        promise = PROMISES.get((spec.kind, variable))
-        for value in values if promise is not None else ():
-            status = promise(spec.options, value) if promise is not None else None
-            if status is not None:
-                yield f'promises({number},{variable},"{value}",{LETTERS[status]}).'
+        for variable, values in WORLD.items():
+            for value in values:
+                status = promise(node, variable, value)
+                if status is not None:
+                    letter = LETTERS[status]
+                    yield f'promises({node.number},{variable},"{value}",{letter}).'

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from py_trees.common import Status
 
+from defras_bt.executive.dangers import WORLD
 from defras_bt.executive.proof.blame import blame
-from defras_bt.executive.proof.claims import WORLD
 from defras_bt.executive.proof.facts import Numbered
 from defras_bt.executive.proof.prover import Proof, Refutation
 from defras_bt.executive.proof.trace import Trace, TracedTick
