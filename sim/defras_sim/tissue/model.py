@@ -63,7 +63,7 @@ class TissueModel:
         element: ElementName | None = None,
         elements_xyz: tuple[int, int, int] | None = None,
         material: MaterialName | None = None,
-        residual_share: float = 5e-6,
+        residual_share: float = 4e-5,
     ) -> None:
         tissue = scene.tissue
         self.scene = scene

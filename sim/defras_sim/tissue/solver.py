@@ -1,9 +1,9 @@
-"""Newton's method on a potential energy, with an old factorisation as preconditioner.
+"""Minima of a potential energy, by a quasi-Newton method on top of a sparse factorisation.
 
-Each step solves the current tangent by conjugate gradients, preconditioned by the last
-factorisation: assembling costs 1 ms and an iteration 0.4 ms where factorising costs 10 ms
-(8x8x1 elements, 1,593 unknowns). Measured for one factorisation there: SuperLU with minimum-degree
-ordering in symmetric mode 10 ms, with COLAMD 20 ms, QDLDL 7 ms; SuperLU needs no further package.
+Assembling and factorising the tangent of 12x12x1 elements takes as long as ten energies with their
+gradients and solutions with a known factor. So one factorisation serves for as many steps, and for
+as many motions of the tip, as it pays. Where steps shrink slowly the tangent is factorised anew,
+which is Newton's method.
 """
 
 from __future__ import annotations
@@ -16,6 +16,11 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from defras_sim.geometry import Floats
+from defras_sim.tissue.curvature import Curvature
+from defras_sim.tissue.factorisation import NotPositiveDefinite
+
+# What is added to the tangent's diagonal first where it bends down, as a share of its median.
+_LEAST_SHIFT = 1e-6
 
 
 class Energy(Protocol):
@@ -28,15 +33,23 @@ class Energy(Protocol):
 
 @dataclass(frozen=True)
 class NewtonSettings:
-    """``residual_n`` is the norm of the unbalanced nodal forces at which a solve has converged."""
+    """When a solve has converged, and how much work it may be.
+
+    Converged: the norm of the unbalanced nodal forces is at most ``residual_n``, and the next step
+    would move no node by more than ``motion_m``. The first bounds the error of forces. It says
+    little about a loose flap, which a micronewton moves by a millimetre; the second does.
+
+    ``patience`` counts the steps that take about as long as a new factorisation.
+    """
 
     residual_n: float
-    max_iterations: int = 60
-    max_cg_iterations: int = 12
-    cg_tolerance: float = 1e-3
+    motion_m: float = 1e-5
+    max_iterations: int = 100
+    max_factorisations: int = 25
     max_step_m: float = 0.01
     sufficient_decrease: float = 1e-4
     min_step_share: float = 1 / 512
+    patience: float = 8.0
 
 
 @dataclass(frozen=True)
@@ -46,114 +59,122 @@ class Solution:
     positions_m: Floats
     converged: bool
     iterations: int
+    factorisations: int = 0
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Where the descent stands: positions (nodes, 3), the energy there, and its gradient."""
+
+    positions_m: Floats
+    energy_j: float
+    gradient_n: Floats
 
 
 class NewtonSolver:
-    """Finds minima of energies that share one sparsity; remembers the last factorisation."""
+    """Finds minima of energies of the same nodes; remembers what it knows of their curvature."""
 
     def __init__(self, settings: NewtonSettings) -> None:
         self.settings = settings
-        self._factor: SuperLU | None = None
+        self._curvature: Curvature | None = None
+        self._known = False
+        self._shift_share = 0.0
 
     def forget(self) -> None:
-        """Drop the factorisation: the next energy has little in common with the last."""
-        self._factor = None
+        """Drop the curvature: the next energy has little in common with the last."""
+        self._known = False
+        self._shift_share = 0.0
 
     def minimise(self, energy: Energy, start_m: Floats) -> Solution:
         """Descend from ``start_m`` (nodes, 3) to an equilibrium."""
         settings = self.settings
-        x = start_m.copy()
-        value, gradient = energy.energy_and_gradient(x)
-        if not np.isfinite(value):
-            return Solution(x, False, 0)
-        shift = 0.0
-        for iteration in range(settings.max_iterations):
-            if float(np.linalg.norm(gradient)) <= settings.residual_n:
-                return Solution(x, True, iteration)
-            tangent = energy.tangent(x)
-            scale = float(np.median(tangent.diagonal()))
-            moved = None
-            while moved is None and shift <= 10.0:
-                direction = self._direction(tangent, gradient, shift * scale)
-                if direction is not None:
-                    moved = self._line_search(energy, x, value, gradient, direction)
-                if moved is None:
-                    self._factor = None
-                    shift = max(1e-4, 10 * shift)
-            if moved is None:
-                return Solution(x, False, iteration)
-            x, value, gradient = moved
-            shift = 0.1 * shift if shift > 1e-5 else 0.0
-        done = float(np.linalg.norm(gradient)) <= settings.residual_n
-        return Solution(x, done, settings.max_iterations)
+        here = _Point(start_m.copy(), *energy.energy_and_gradient(start_m))
+        if not np.isfinite(here.energy_j):
+            return Solution(here.positions_m, False, 0)
+        curvature = self._curvature = self._curvature or Curvature(start_m)
+        iterations = factorisations = 0
+        excess = np.inf
+        while iterations < settings.max_iterations:
+            fresh = not self._known
+            if fresh:
+                if factorisations == settings.max_factorisations:
+                    break
+                factorisations += 1
+                if not self._factorise(curvature, energy.tangent(here.positions_m), here):
+                    continue
+            else:
+                curvature.look_from(here.positions_m)
+            step_m = curvature.newton_step(here.gradient_n)
+            before, excess = excess, self._excess(here.gradient_n, step_m)
+            if excess <= 1.0 and self._shift_share == 0.0:
+                return Solution(here.positions_m, True, iterations, factorisations)
+            there = None
+            if fresh or self._pays(before, excess):
+                there = self._line_search(energy, here, step_m)
+            if there is None:
+                # Where even an exact tangent gives no good step, shorter ones may be.
+                self._shift_share = self._more_shift() if fresh else 0.0
+                self._known, excess = False, np.inf
+                continue
+            curvature.learn(
+                there.positions_m - here.positions_m, there.gradient_n - here.gradient_n
+            )
+            here = there
+            iterations += 1
+        return Solution(here.positions_m, False, iterations, factorisations)
 
     def solve_tangent(self, tangent: sparse.csc_array, right: Floats) -> Floats:
         """Solve ``tangent`` x = ``right`` (unknowns, k) exactly, with a fresh factorisation."""
-        self._factor = factorised(tangent)
-        return self._factor.solve(right)
+        return factorised(tangent).solve(right)
 
-    def _direction(
-        self, tangent: sparse.csc_array, gradient: Floats, shift: float
-    ) -> Floats | None:
-        """A descent direction (nodes, 3), or None where the shifted tangent gives none."""
-        if shift > 0:
-            tangent = sparse.csc_array(tangent + shift * sparse.eye_array(tangent.shape[0]))
-        right = -gradient.ravel()
-        found = None
-        if self._factor is not None:
-            found = self._conjugate_gradients(tangent, right, self._factor)
-        if found is None:
-            try:
-                self._factor = factorised(tangent)
-            except RuntimeError:  # SuperLU: exactly singular
-                return None
-            found = self._factor.solve(right)
-            if not np.all(np.isfinite(found)) or found @ (tangent @ found) <= 0:
-                return None
-        return found.reshape(gradient.shape) if found @ right > 0 else None
+    def _factorise(self, curvature: Curvature, tangent: sparse.csc_array, here: _Point) -> bool:
+        """Whether the tangent, with the shift that it is given, has a factor."""
+        shift = self._shift_share * float(np.median(tangent.diagonal()))
+        try:
+            curvature.factorise(tangent, here.positions_m, shift)
+        except NotPositiveDefinite:
+            self._shift_share = self._more_shift()
+            return False
+        self._known = True
+        return True
 
-    def _conjugate_gradients(
-        self, tangent: sparse.csc_array, right: Floats, factor: SuperLU
-    ) -> Floats | None:
-        """None if the preconditioner is too old, or curvature is negative along the way."""
-        x = np.zeros_like(right)
-        residual = right.copy()
-        z = factor.solve(residual)
-        p = z
-        rho = residual @ z
-        goal = self.settings.cg_tolerance**2 * rho
-        for _ in range(self.settings.max_cg_iterations):
-            image = tangent @ p
-            curvature = p @ image
-            if not (rho > 0 and curvature > 0):
-                return None
-            step = rho / curvature
-            x += step * p
-            residual -= step * image
-            z = factor.solve(residual)
-            rho, last = residual @ z, rho
-            if 0 <= rho <= goal:
-                return x
-            p = z + (rho / last) * p
-        return None
+    def _more_shift(self) -> float:
+        return max(_LEAST_SHIFT, 10 * self._shift_share)
 
-    def _line_search(
-        self, energy: Energy, x: Floats, value: float, gradient: Floats, direction: Floats
-    ) -> tuple[Floats, float, Floats] | None:
+    def _excess(self, gradient_n: Floats, step_m: Floats) -> float:
+        """How many times too large the unbalanced forces, or the next step, still are."""
+        residual_n = float(np.linalg.norm(gradient_n))
+        return max(residual_n / self.settings.residual_n, _longest(step_m) / self.settings.motion_m)
+
+    def _pays(self, before: float, excess: float) -> bool:
+        """Whether steps that shrink like the last end sooner than after another factorisation."""
+        if not np.isfinite(before):
+            return True
+        return excess < before and bool(
+            np.log(excess) <= self.settings.patience * np.log(before / excess)
+        )
+
+    def _line_search(self, energy: Energy, here: _Point, step_m: Floats) -> _Point | None:
         """Backtrack until the energy falls enough; None if it never does."""
         settings = self.settings
-        slope = float(np.sum(gradient * direction))
-        longest = float(np.sqrt((direction**2).sum(axis=1).max()))
-        step = min(1.0, settings.max_step_m / longest)
-        rounding = 1e-12 * abs(value)
-        while step >= settings.min_step_share * min(1.0, settings.max_step_m / longest):
-            there = x + step * direction
-            value_there, gradient_there = energy.energy_and_gradient(there)
-            enough = value + settings.sufficient_decrease * step * slope + rounding
-            if value_there <= enough and np.all(np.isfinite(gradient_there)):
-                return there, value_there, gradient_there
-            step *= 0.5
+        slope = float(np.sum(here.gradient_n * step_m))
+        if not slope < 0:
+            return None
+        share = most = min(1.0, settings.max_step_m / _longest(step_m))
+        rounding = 1e-12 * abs(here.energy_j)
+        while share >= settings.min_step_share * most:
+            there = here.positions_m + share * step_m
+            value, gradient = energy.energy_and_gradient(there)
+            enough = here.energy_j + settings.sufficient_decrease * share * slope + rounding
+            if value <= enough and np.all(np.isfinite(gradient)):
+                return _Point(there, value, gradient)
+            share *= 0.5
         return None
+
+
+def _longest(step_m: Floats) -> float:
+    """How far the node that moves farthest moves."""
+    return float(np.sqrt((step_m**2).sum(axis=1).max()))
 
 
 def factorised(tangent: sparse.csc_array) -> SuperLU:
