@@ -1,4 +1,4 @@
-"""``defras explain``: why a run went as it did, from its record."""
+"""``defras explain``: why a run went as it did, from its record; why a plan is as it is."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from defras_bt.cli.errors import UserError
+from defras_bt.cli.explain_plan import explain_plan
 from defras_bt.executive.reasons import Code, Remedy
 from defras_bt.recording.decision_reader import Decisions, InvalidDecisions, read_decisions
 from defras_bt.recording.explain import explain as explanation_of
@@ -18,10 +19,16 @@ from defras_bt.recording.moment import Moment
 
 
 def explain(
-    run: Annotated[Path, typer.Argument(help="Folder that defras run --out left.")],
+    run: Annotated[Path, typer.Argument(help="Folder that defras run --out left, or a plan file.")],
     tick: Annotated[int | None, typer.Option(min=0, help="Explain this tick.")] = None,
     time: Annotated[
         float | None, typer.Option(min=0, help="Explain the tick at this world time in s.")
+    ] = None,
+    why_not: Annotated[
+        str | None, typer.Option(help='Of a plan: like "grasp psm1 point (2,3)".')
+    ] = None,
+    scene: Annotated[
+        str | None, typer.Option(help="Of a plan: its scene, if it is not a shipped one.")
     ] = None,
 ) -> None:
     """Say why the run ended and when something was decided; or explain one tick.
@@ -30,10 +37,21 @@ def explain(
     programs may compare them.
 
     Example: defras explain out/demo; defras explain out/demo --tick 412
+
+    Of a plan file that defras plan wrote: why each action is there, and why not another.
+
+    Example: defras explain sim1.plan.json --why-not "grasp psm1 point (2,3)"
     """
     console = Console(soft_wrap=True, highlight=False)
     if tick is not None and time is not None:
         raise UserError("--tick and --time: give one of them")
+    if run.is_file():
+        if tick is not None or time is not None:
+            raise UserError(f"--tick and --time: {run} is a plan; they belong to a run's folder")
+        explain_plan(run, scene, why_not, console)
+        return
+    if why_not is not None or scene is not None:
+        raise UserError(f"--why-not and --scene belong to a plan file; {run} is none")
     try:
         decisions = read_decisions(run)
         if tick is None and time is None:

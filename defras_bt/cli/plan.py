@@ -197,7 +197,7 @@ def _progress(console: Console) -> Iterator[Report]:
 
         def report(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total)
-            if not console.is_terminal and (5 * done) // total > (5 * (done - 1)) // total:
+            if done and not console.is_terminal and (5 * done) // total > (5 * (done - 1)) // total:
                 console.print(f"rehearsing grasp points: {done} of {total}", markup=False)
 
         yield report

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from defras_bt.planning.plan import MANOEUVRES, GridPoint, Situation
+from defras_sim.advice import Matter
 from defras_sim.scene import Scene
 
 _SIDES = {"+y": "plus", "-y": "minus"}
@@ -59,16 +60,19 @@ def scene_facts(scene: Scene) -> str:
         lines.append(f"distance_to_roi({place},{to_roi[point]}).")
         lines.append(f"point_rank({place},{rank}).")
     for number, advice in enumerate(scene.advice):
-        about = advice.matter
-        place = "any" if about.point is None else _text(about.point)
-        words = f"{advice.kind},{about.action or 'any'},{about.arm or 'any'},{place}"
-        lines.append(f"advice({number},{words}).")
+        lines.append(advice_fact(number, advice.kind, advice.matter))
     return "\n".join(lines)
 
 
-def advice_atoms(scene: Scene) -> set[Symbol]:
-    """The external atoms that put the scene's rules in force."""
-    return {Function("advised", [Number(number)]) for number in range(len(scene.advice))}
+def advice_fact(number: int, kind: str, about: Matter) -> str:
+    """One rule: an expert's, or what a question demands."""
+    place = "any" if about.point is None else _text(about.point)
+    return f"advice({number},{kind},{about.action or 'any'},{about.arm or 'any'},{place})."
+
+
+def advised(number: int) -> Symbol:
+    """The external atom that puts a rule in force."""
+    return Function("advised", [Number(number)])
 
 
 def belief_facts(distances_mm: dict[GridPoint, int]) -> str:

@@ -39,12 +39,11 @@ def save_plan(result: PreoperativeResult, file: Path) -> None:
     file.write_text(content.model_dump_json(by_alias=True, indent=1) + "\n", encoding="utf-8")
 
 
-def load_plan(file: Path, scene: Scene) -> PreoperativeResult:
-    """Read a plan made for ``scene``.
+def read_plan(file: Path) -> PreoperativeResult:
+    """Read a plan, whatever scene it was made for.
 
     Raises:
         InvalidPlanFile: the file is no plan file.
-        StalePlanFile: it was made for other content than ``scene`` has now.
     """
     try:
         content = file.read_bytes()
@@ -53,7 +52,7 @@ def load_plan(file: Path, scene: Scene) -> PreoperativeResult:
             f"{file}: cannot be read: {error.strerror}; give a file that `defras plan -o` wrote"
         ) from error
     try:
-        result = _PlanFile.model_validate_json(content).result
+        return _PlanFile.model_validate_json(content).result
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "the file"
@@ -61,6 +60,16 @@ def load_plan(file: Path, scene: Scene) -> PreoperativeResult:
             f"{file}: {place}: {first['msg']}; valid are files with schema {SCHEMA}, as "
             "`defras plan` writes them"
         ) from error
+
+
+def load_plan(file: Path, scene: Scene) -> PreoperativeResult:
+    """Read a plan made for ``scene``.
+
+    Raises:
+        InvalidPlanFile: the file is no plan file.
+        StalePlanFile: it was made for other content than ``scene`` has now.
+    """
+    result = read_plan(file)
     if result.scene_hash != scene_hash(scene):
         raise StalePlanFile(
             f"{file}: made for scene {result.scene!r} before it changed; plan again for the scene "

@@ -16,7 +16,8 @@ from defras_bt.planning.english import (
     reason_sentence,
 )
 from defras_bt.planning.facts import (
-    advice_atoms,
+    advice_fact,
+    advised,
     attachment_distances_mm,
     belief_facts,
     require_valid,
@@ -26,6 +27,7 @@ from defras_bt.planning.facts import (
 )
 from defras_bt.planning.plan import ACTIONS, Action, GridPoint, Plan, Situation
 from defras_bt.planning.program import PROGRAMS, Answer, RetractionProgram
+from defras_sim.advice import Matter
 from defras_sim.resources import resource
 from defras_sim.scene import Scene
 
@@ -59,6 +61,7 @@ class Planner:
         max_horizon: longest plan looked for.
         budget_s: longest time for one solve, after which it is cancelled.
         programs: the ASP programs, by default those in asp/.
+        demanded: only plans with such an action, to answer "why not".
     """
 
     def __init__(
@@ -68,12 +71,18 @@ class Planner:
         max_horizon: int = MAX_HORIZON,
         budget_s: float = 10.0,
         programs: Iterable[Path] | None = None,
+        demanded: Matter | None = None,
     ) -> None:
         self.scene = scene
         self.max_horizon = max_horizon
         self.budget_s = budget_s
         files = [resource(name) for name in PROGRAMS] if programs is None else list(programs)
         self._files = files
+        self._rules = range(len(scene.advice))
+        self._facts = scene_facts(scene)
+        if demanded is not None:
+            self._facts += "\n" + advice_fact(len(scene.advice), "demand", demanded)
+            self._rules = range(len(scene.advice) + 1)
         self._program = self._grounded()
         self._roi_mm = roi_distances_mm(scene)
 
@@ -100,7 +109,8 @@ class Planner:
         """
         needed = tuple(situation.exposing if exposing is None else exposing)
         require_valid(self.scene, situation, needed, required_grasp)
-        world = world_atoms(situation, needed, required_grasp) | advice_atoms(self.scene)
+        world = world_atoms(situation, needed, required_grasp)
+        world |= {advised(number) for number in self._rules}
         attachment_mm = attachment_distances_mm(self.scene, attached)
         if self._program.beliefs >= MAX_BELIEFS:
             self._program = self._grounded()
@@ -112,7 +122,7 @@ class Planner:
         return self._plan_from(answer, situation, attachment_mm)
 
     def _grounded(self) -> RetractionProgram:
-        return RetractionProgram(scene_facts(self.scene), self._files, self.max_horizon)
+        return RetractionProgram(self._facts, self._files, self.max_horizon)
 
     def _plan_from(
         self, answer: Answer, situation: Situation, attachment_mm: dict[GridPoint, int]
@@ -156,10 +166,10 @@ class Planner:
         core = self._program.conflict(removable, self.budget_s)
         if core is None:
             raise RuntimeError("a plan exists that the optimisation did not find")
-        rules = [self.scene.advice[a.arguments[0].number] for a in core if a.name == "advised"]
-        sentences = [
-            *obstacle_sentences(core, len(self.scene.grasp_points)),
-            *(rule.sentence() for rule in rules),
+        sentences = list(obstacle_sentences(core, len(self.scene.grasp_points)))
+        in_the_way = {atom.arguments[0].number for atom in core if atom.name == "advised"}
+        sentences += [
+            rule.sentence() for i, rule in enumerate(self.scene.advice) if i in in_the_way
         ]
         if required is not None and not self.scene.arms_at(*required):
             sentences.append(

@@ -111,7 +111,7 @@ def result_of(
     planner, situation = Planner(scene), Situation({name: ArmSituation() for name in scene.arms})
     if chosen is None:
         plan = planner.plan(situation, scene.attached)
-        reason = _why_none(executions, scene.thresholds.roi_visibility, limit_n)
+        reason = _why_none(scene, executions, allowed, limit_n)
     else:
         plan = planner.plan(
             situation,
@@ -162,18 +162,26 @@ def median_force_n(executions: Sequence[Execution]) -> float:
     return float(np.median([execution.force_max_n for execution in executions]))
 
 
-def _why_none(executions: Sequence[Execution], visibility: float, limit_n: float) -> str:
-    exposing = [e for e in executions if e.visibility >= visibility]
-    if exposing:
+def _why_none(
+    scene: Scene, executions: Sequence[Execution], allowed: Sequence[Execution], limit_n: float
+) -> str:
+    """Why none of the ``executions``, of which the scene's rules leave ``allowed``, was chosen."""
+    visibility = scene.thresholds.roi_visibility
+    exposing = [e for e in allowed if e.visibility >= visibility]
+    ruled_out = len(executions) - len(allowed)
+    rules = f" (the scene's rules forbid {ruled_out} others)" if ruled_out else ""
+    if not allowed:
+        why = f"the scene's rules forbid all {len(executions)} rehearsed retractions"
+    elif exposing:
         force_n = min(e.force_max_n for e in exposing)
         why = (
             f"the gentlest of the {len(exposing)} rehearsed retractions that expose the region "
-            f"needs {force_n:.2f} N, more than the threshold of {limit_n:.2f} N"
+            f"needs {force_n:.2f} N, more than the threshold of {limit_n:.2f} N{rules}"
         )
     else:
-        best = max(executions, key=lambda e: e.visibility)
+        best = max(allowed, key=lambda e: e.visibility)
         why = (
-            f"none of the {len(executions)} rehearsed retractions shows {visibility:.0%} of the "
-            f"region; the best, at {point_text(best.point)}, shows {best.visibility:.0%}"
+            f"none of the {len(allowed)} rehearsed retractions shows {visibility:.0%} of the "
+            f"region; the best, at {point_text(best.point)}, shows {best.visibility:.0%}{rules}"
         )
     return f"{why}; the plan is the one that the grasp-point optimisation prefers"

@@ -8,7 +8,7 @@ import pytest
 from defras_bt.planning.execution import Execution
 from defras_bt.planning.plan import ArmSituation, Situation
 from defras_bt.planning.planner import NoPlan, Planner
-from defras_bt.planning.preoperative import forbidden
+from defras_bt.planning.preoperative import forbidden, result_of
 from defras_sim.advice import Advice
 from tests.planning.conftest import make_scene
 from tests.planning.oracle import Oracle
@@ -71,6 +71,15 @@ def test_rehearsed_retractions_are_judged_by_the_same_rules():
     assert forbidden(scene, upper)
     assert not forbidden(scene, lower)
     assert not forbidden(scene, Execution((2, 5), ("pull",), 1.0, 0.1, True))
+
+
+def test_without_an_allowed_retraction_the_rules_are_named():
+    scene = ruled({"forbid": "fold psm1"})
+    free = Execution((2, 5), ("pull",), 0.4, 0.1, True)
+    folded = Execution((2, 5), ("pull", "fold"), 1.0, 0.1, True)
+    reason = result_of(scene, (free, folded), 0.1).reason
+    assert "none of the 1 rehearsed retractions shows 80% of the region" in reason
+    assert "(the scene's rules forbid 1 others)" in reason
 
 
 class RuledOracle(Oracle):
