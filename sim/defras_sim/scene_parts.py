@@ -14,7 +14,7 @@ from defras_sim.anatomy.anatomy import Anatomy
 from defras_sim.rest_shape import RestShape, Slab
 
 Positive = Annotated[float, Field(gt=0)]
-Coordinate = Annotated[float, Field(ge=-2, le=2)]
+Coordinate = Annotated[float, Field(ge=-5, le=5)]
 """Of something in the operating theatre, in metres from the tissue's centre."""
 Vector = tuple[Coordinate, Coordinate, Coordinate]
 Side = Annotated[float, Field(gt=0, le=0.5)]

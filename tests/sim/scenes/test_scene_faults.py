@@ -71,7 +71,7 @@ def test_the_good_file_is_good(tmp_path: Path) -> None:
         (
             GOOD + "arms:\n  psm1: {rcm_m: [0, 90, 200], home_tip_m: [0, 0, 0], side: +y}\n",
             "20:21",
-            ("less than or equal to 2",),
+            ("less than or equal to 5",),
         ),
         (
             GOOD.replace("  map:", "  hole_pitch_m: 0.002\n  map:"),
