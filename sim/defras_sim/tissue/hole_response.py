@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from defras_sim.geometry import Floats
 from defras_sim.tissue.mesh import Integers
+from defras_sim.tissue.response import Solve
 from defras_sim.tissue.springs import ROWS, SpringTerm
 from defras_sim.tissue.surface import SurfaceMap
 
@@ -32,13 +32,10 @@ def hole_response(
     attachments: SpringTerm,
     positions_m: Floats,
     surface: SurfaceMap,
-    solve: Callable[[Floats], Floats],
+    solve: Solve,
     holes: Integers,
 ) -> HoleResponse:
-    """The response to forces where ``holes`` hold, at the equilibrium ``positions_m`` (nodes, 3).
-
-    ``solve`` gives the motion (3 nodes, columns) for nodal forces (3 nodes, columns).
-    """
+    """The response at the equilibrium ``positions_m`` (nodes, 3), where ``solve`` belongs to."""
     chosen = np.asarray(holes, dtype=np.int64)
     rows = (ROWS * chosen[:, None] + np.arange(ROWS)).ravel()
     on_holes = attachments.springs.rows[rows].toarray()

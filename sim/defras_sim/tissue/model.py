@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse.linalg import SuperLU
 
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import ElementName, MaterialName, Scene
@@ -24,9 +23,10 @@ from defras_sim.tissue.mesh import Integers
 from defras_sim.tissue.parameters import Parameter
 from defras_sim.tissue.path import length_m
 from defras_sim.tissue.readout import tissue_state
+from defras_sim.tissue.response import LinearResponse
 from defras_sim.tissue.rest import is_loaded, lying_m, settled
 from defras_sim.tissue.sensitivity import Sensitivities, sensitivities
-from defras_sim.tissue.solver import NewtonSettings, NewtonSolver, factorised
+from defras_sim.tissue.solver import NewtonSettings, NewtonSolver
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.surface import surface_map
 from defras_sim.tissue.terms import Term
@@ -92,7 +92,7 @@ class TissueModel:
             self._holes.anchor_at(self._rest_m)
         self._rest_is_known = False
         self._energy = self._assembled()
-        self._factorised: tuple[PotentialEnergy, Floats, SuperLU] | None = None
+        self._response = LinearResponse(self.mesh.nodes_m)
         self._positions_m = self.rest_m.copy()
 
     @property
@@ -261,26 +261,19 @@ class TissueModel:
             self._grasps,
             self._positions_m,
             self._surface,
-            self._response,
+            self._response.at(self._energy, self._positions_m),
             parameters,
         )
 
     def response_to_hole_forces(self, holes: Integers) -> HoleResponse:
         """Linear response of the surface and of ``holes`` to forces where ``holes`` hold."""
         return hole_response(
-            self._holes.term, self._positions_m, self._surface, self._response, holes
+            self._holes.term,
+            self._positions_m,
+            self._surface,
+            self._response.at(self._energy, self._positions_m),
+            holes,
         )
-
-    def _response(self, forces_n: Floats) -> Floats:
-        """Motion (3 nodes, columns) per nodal forces (3 nodes, columns), at the last equilibrium.
-
-        The factorisation is kept for as long as the equilibrium stays.
-        """
-        known = self._factorised
-        if known is None or known[0] is not self._energy or known[1] is not self._positions_m:
-            factor = factorised(self._energy.tangent(self._positions_m))
-            known = self._factorised = (self._energy, self._positions_m, factor)
-        return known[2].solve(forces_n)
 
     def _changed(self) -> None:
         """What holds the tissue is different from now on."""

@@ -27,6 +27,8 @@ def settled(solver: NewtonSolver, energy: Energy, start_m: Floats) -> Solution:
 
     ``converged`` False where none is found; the positions are the lowest found.
     """
+    if not np.any(energy.energy_and_gradient(start_m)[1]):
+        return Solution(start_m, True, 0)
     solver.forget()
     solution = Solution(start_m, False, 0)
     iterations = 0

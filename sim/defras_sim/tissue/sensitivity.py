@@ -7,7 +7,7 @@ move with a parameter: K dx/dp = -dg/dp, with the tangent K that Newton's method
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,11 +25,9 @@ from defras_sim.tissue.parameters import (
     change_of,
     spring_term,
 )
+from defras_sim.tissue.response import Solve
 from defras_sim.tissue.springs import ROWS, SpringTerm
 from defras_sim.tissue.surface import SurfaceMap
-
-Solve = Callable[[Floats], Floats]
-"""Solves the tangent for right-hand sides (3 nodes, columns)."""
 
 BED = "bed"
 

@@ -13,7 +13,6 @@ from typing import Protocol
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
 
 from defras_sim.geometry import Floats
 from defras_sim.tissue.curvature import Curvature
@@ -123,10 +122,6 @@ class NewtonSolver:
             iterations += 1
         return Solution(here.positions_m, False, iterations, factorisations)
 
-    def solve_tangent(self, tangent: sparse.csc_array, right: Floats) -> Floats:
-        """Solve ``tangent`` x = ``right`` (unknowns, k) exactly, with a fresh factorisation."""
-        return factorised(tangent).solve(right)
-
     def _factorise(self, curvature: Curvature, tangent: sparse.csc_array, here: _Point) -> bool:
         """Whether the tangent, with the shift that it is given, has a factor."""
         shift = self._shift_share * float(np.median(tangent.diagonal()))
@@ -175,13 +170,3 @@ class NewtonSolver:
 def _longest(step_m: Floats) -> float:
     """How far the node that moves farthest moves."""
     return float(np.sqrt((step_m**2).sum(axis=1).max()))
-
-
-def factorised(tangent: sparse.csc_array) -> SuperLU:
-    """Factorise a symmetric matrix without pivoting off the diagonal."""
-    return splu(
-        tangent,
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )

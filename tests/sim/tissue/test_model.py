@@ -151,7 +151,9 @@ def test_reset_gives_the_rest_shape():
 
 def test_the_way_does_not_matter_while_there_is_one_equilibrium():
     direct = retract(model(residual_share=1e-6), GRASP, LIFTED)
-    around = retract(model(residual_share=1e-6), GRASP, at(0.05, -0.005, 0.02), at(0.04, 0.0, 0.035), LIFTED)
+    around = retract(
+        model(residual_share=1e-6), GRASP, at(0.05, -0.005, 0.02), at(0.04, 0.0, 0.035), LIFTED
+    )
     np.testing.assert_allclose(direct.nodes_m, around.nodes_m, atol=1e-5)
 
 
