@@ -89,7 +89,7 @@ def _importable(name: str) -> str | None:
 
 def _data() -> list[Finding]:
     findings = []
-    for folder in ("trees", "asp", "sim/scenes", "sim/robots"):
+    for folder in ("trees", "asp", "sim/scenes", "sim/robots", "sim/faults"):
         try:
             count = sum(1 for _ in resource(folder).iterdir())
             found: str | None = f"{count} files"
