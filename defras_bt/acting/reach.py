@@ -22,7 +22,7 @@ class Reach(ArmAction):
         if self.arm in board.grips:
             return self.fail(Code.HOLDING, f"{self.who} holds tissue and cannot reach elsewhere")
         speed = scene.motion.reach_speed_m_s
-        goal_m = np.array([*scene.grasp_xy_m(*self.point), 0.0])
+        goal_m = scene.grasp_point_m(*self.point)
         board.at.pop(self.arm, None)
         if self.go(self._waypoint_m(goal_m), speed) and np.allclose(
             self.setpoint_m, goal_m, atol=ARRIVED_M
@@ -33,7 +33,8 @@ class Reach(ArmAction):
 
     def _waypoint_m(self, goal_m: Floats) -> Floats:
         tip_m = self.setpoint_m
-        clearance_m = self.context.scene.motion.clearance_m
+        scene = self.context.scene
+        clearance_m = float(scene.tissue.shape.high_m[2]) + scene.motion.clearance_m
         if np.linalg.norm(goal_m[:2] - tip_m[:2]) <= 2 * ARRIVED_M:
             return goal_m
         if tip_m[2] < clearance_m - ARRIVED_M:

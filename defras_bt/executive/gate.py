@@ -22,7 +22,7 @@ from defras_sim.worlds.protocol import (
     Observation,
 )
 
-# Tips may not go deeper than the grasp depth plus this, nor farther out than the slab plus this.
+# Tips may not go deeper than the grasp depth plus this, nor farther out than the tissue plus this.
 BELOW_SURFACE_M = 0.003
 BESIDE_TISSUE_M = 0.10
 ABOVE_TISSUE_M = 0.12
@@ -71,9 +71,10 @@ class CommandGate:
         self._arms: Mapping[str, ArmLimits] = {
             name: ArmLimits(np.array(arm.rcm_m)) for name, arm in scene.arms.items()
         }
-        half = np.array([scene.tissue.length_x_m, scene.tissue.width_y_m]) / 2 + BESIDE_TISSUE_M
-        self._low_m = np.array([*-half, -BELOW_SURFACE_M])
-        self._high_m = np.array([*half, ABOVE_TISSUE_M])
+        shape = scene.tissue.shape
+        low, high = shape.low_m - BESIDE_TISSUE_M, shape.high_m + BESIDE_TISSUE_M
+        self._low_m = np.array([*low[:2], scene.lowest_grasp_m - BELOW_SURFACE_M])
+        self._high_m = np.array([*high[:2], float(shape.high_m[2]) + ABOVE_TISSUE_M])
 
     def check(self, proposed: Proposal, inputs: TickInputs) -> GateVerdict:
         """The command that may leave."""

@@ -154,7 +154,7 @@ class AttachmentSearch:
     def _observable(self, attached: Mask) -> Mask:
         """Holes that a frame can tell anything about: free and away from rest, or under load."""
         s = self._settings
-        free = ~attached & (self._stretch_m > s.observable_stretch_m)
+        free = self._belief.is_hole & ~attached & (self._stretch_m > s.observable_stretch_m)
         loaded = attached & (self._force_n > s.observable_force_share * self._force_n.max())
         shape = self._grid.shape
         near = np.zeros(shape, bool)
@@ -222,7 +222,7 @@ class AttachmentSearch:
             now = self._cost.of([frame.residual_m for frame in frames], attached[None])
             price[seen[:, 0]] = self._cost.of(flipped, sets[seen[:, 0]]) - now
         wrong = 1.0 / (1.0 + np.exp(np.clip(price, 0.0, 50.0)))
-        return np.where(attached, 1.0 - wrong, wrong)
+        return np.where(self._belief.is_hole, np.where(attached, 1.0 - wrong, wrong), 0.0)
 
 
 def _moved_m(surface: Surface, scene: Scene) -> Floats:
@@ -230,5 +230,5 @@ def _moved_m(surface: Surface, scene: Scene) -> Floats:
     lower = np.flatnonzero(~surface.upper)
     nearest = cKDTree(surface.rest_xy_m[lower]).query(scene.holes_xy_m)[1]
     over = lower[nearest]
-    rest = np.column_stack([surface.rest_xy_m[over], np.full(len(over), -scene.tissue.thickness_m)])
+    rest = scene.tissue.shape.lower.at(surface.rest_xy_m[over])
     return np.asarray(np.linalg.norm(surface.vertices_m[over] - rest, axis=1))

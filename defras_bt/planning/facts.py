@@ -124,13 +124,11 @@ def require_valid(
 
 
 def _require_on_grid(scene: Scene, points: Iterable[GridPoint]) -> None:
-    grid = scene.grasp
+    valid = scene.grasp_points
     for column, row in points:
-        if not (1 <= column <= grid.columns and 1 <= row <= grid.rows):
-            raise ValueError(
-                f"({column},{row}) is no grasp point; valid are (1,1) to "
-                f"({grid.columns},{grid.rows})"
-            )
+        if (column, row) not in valid:
+            first, last = (f"({c},{r})" for c, r in (valid[0], valid[-1]))
+            raise ValueError(f"({column},{row}) is no grasp point; valid are {first} to {last}")
 
 
 def point_symbol(point: GridPoint) -> Symbol:

@@ -11,7 +11,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -191,16 +191,8 @@ def _limit(axis: Axes, value: float, colour: str, name: str) -> None:
 def _attachment_map(
     axis: Axes, scene: Scene, held: NDArray[np.bool_], actual: NDArray[np.bool_] | None
 ) -> None:
-    half_x, half_y = 500 * scene.tissue.length_x_m, 500 * scene.tissue.width_y_m
-    axis.add_patch(
-        Rectangle(
-            (-half_x, -half_y),
-            2 * half_x,
-            2 * half_y,
-            facecolor="#fbf1ef",
-            edgecolor=css(palette.TISSUE),
-        )
-    )
+    outline = 1000 * scene.tissue.shape.outline_m
+    axis.add_patch(Polygon(outline, facecolor="#fbf1ef", edgecolor=css(palette.TISSUE)))
     roi_mm = 1000 * scene.roi_center_m[:2]
     axis.add_patch(
         Circle(
@@ -212,7 +204,7 @@ def _attachment_map(
         )
     )
     x, y = 1000 * scene.holes_xy_m.T
-    axis.scatter(x, y, s=5, color="#c9ced4", zorder=2)
+    axis.scatter(x[scene.is_hole], y[scene.is_hole], s=5, color="#c9ced4", zorder=2)
     wrong = np.zeros(len(held), bool) if actual is None else held & ~actual
     missed = np.zeros(len(held), bool) if actual is None else actual & ~held
     right = held & ~wrong
@@ -230,8 +222,8 @@ def _attachment_map(
         x[missed], y[missed], s=46, marker="x", color=css(palette.ACTUAL), linewidth=2.0, zorder=3
     )
     margin = 4
-    axis.set_xlim(-half_x - margin, half_x + margin)
-    axis.set_ylim(-half_y - margin, half_y + margin)
+    axis.set_xlim(outline[:, 0].min() - margin, outline[:, 0].max() + margin)
+    axis.set_ylim(outline[:, 1].min() - margin, outline[:, 1].max() + margin)
     axis.set_aspect("equal")
     axis.axis("off")
 

@@ -7,9 +7,10 @@ import trimesh
 from numpy.typing import NDArray
 
 from defras_bt.recording import palette
+from defras_bt.recording.ground import bed_surface, region_surface
 from defras_bt.recording.record import RunInfo, TickRecord
 from defras_bt.recording.rendering import Body, View, render
-from defras_bt.recording.shapes import disc, rectangle
+from defras_bt.recording.shapes import disc
 from defras_sim.camera.pinhole import looking_at, tissue_from_camera
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
@@ -54,14 +55,12 @@ def _tissue(surface: Surface, simulated: bool) -> list[Body]:
 
 
 def _surroundings(scene: Scene, held: NDArray[np.bool_]) -> list[Body]:
-    center_m = scene.roi_center_m
     bodies = [
-        Body(*rectangle(0.16, 0.14, float(center_m[2]) - 0.0015), _BED),
-        Body(*disc(center_m, scene.roi.radius_m), palette.ROI),
+        Body(*bed_surface(scene, 0.16, 0.14), _BED),
+        Body(*region_surface(scene), palette.ROI),
     ]
-    depth_m = scene.tissue.thickness_m + 0.0006
-    for xy in scene.holes_xy_m[held]:
-        bodies.append(Body(*disc(np.array([*xy, -depth_m]), 0.0032, 16), palette.BELIEVED))
+    for place_m in scene.holes_m[held] - [0.0, 0.0, 0.0006]:
+        bodies.append(Body(*disc(place_m, 0.0032, 16), palette.BELIEVED))
     return bodies
 
 

@@ -7,8 +7,9 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from defras_bt.recording import palette
+from defras_bt.recording.ground import bed_surface, region_outline_m, region_surface
 from defras_bt.recording.record import RunInfo
-from defras_bt.recording.shapes import circle, disc, rectangle
+from defras_bt.recording.shapes import circle, vertex_normals
 from defras_sim.camera.pinhole import intrinsics, tissue_from_camera
 from defras_sim.geometry import Floats
 from defras_sim.scene import Camera, Scene
@@ -23,8 +24,8 @@ def log_scene(stream: rr.RecordingStream, info: RunInfo) -> None:
     _log_camera(stream, "endoscope", scene.endoscope)
     _log_camera(stream, "depth_camera", scene.depth_camera)
     if info.actual is not None:
-        held = scene.holes_xy_m[info.actual.attached]
-        rings = [circle(_below(scene, xy), 0.0042, 24) for xy in held]
+        held = _holes_below_m(scene)[info.actual.attached]
+        rings = [circle(place_m, 0.0042, 24) for place_m in held]
         stream.log(
             "world/attachments/actual",
             rr.LineStrips3D(rings, colors=palette.ACTUAL, radii=0.0006),
@@ -41,8 +42,7 @@ def log_scene(stream: rr.RecordingStream, info: RunInfo) -> None:
 
 def log_believed(stream: rr.RecordingStream, scene: Scene, believed: NDArray[np.bool_]) -> None:
     """The holes that are believed to hold, as of now."""
-    xy = scene.holes_xy_m[believed]
-    points = np.array([_below(scene, hole) for hole in xy]).reshape(-1, 3)
+    points = _holes_below_m(scene)[believed]
     stream.log(
         "world/attachments/believed",
         rr.Points3D(points, colors=palette.BELIEVED, radii=0.003),
@@ -54,12 +54,11 @@ def log_believed(stream: rr.RecordingStream, scene: Scene, believed: NDArray[np.
 
 
 def _log_bed_and_region(stream: rr.RecordingStream, scene: Scene) -> None:
-    center = scene.roi_center_m
-    bed, faces = rectangle(0.11, 0.10, float(center[2]) - 0.0015)
-    stream.log("world/bed", _flat(bed, faces, palette.BED), static=True)
-    region, faces = disc(center, scene.roi.radius_m)
-    stream.log("world/roi/region", _flat(region, faces, palette.ROI), static=True)
-    outline = circle(center + [0, 0, 0.0005], scene.roi.radius_m)
+    bed, faces = bed_surface(scene, 0.11, 0.10)
+    stream.log("world/bed", _mesh(bed, faces, palette.BED), static=True)
+    region, faces = region_surface(scene)
+    stream.log("world/roi/region", _mesh(region, faces, palette.ROI), static=True)
+    outline = region_outline_m(scene) + [0, 0, 0.0005]
     stream.log(
         "world/roi/outline",
         rr.LineStrips3D([outline], colors=palette.ROI, radii=0.0011),
@@ -67,11 +66,11 @@ def _log_bed_and_region(stream: rr.RecordingStream, scene: Scene) -> None:
     )
 
 
-def _flat(vertices_m: Floats, faces: NDArray[np.int64], colour: palette.Rgb) -> rr.Mesh3D:
+def _mesh(vertices_m: Floats, faces: NDArray[np.int64], colour: palette.Rgb) -> rr.Mesh3D:
     return rr.Mesh3D(
         vertex_positions=vertices_m,
         triangle_indices=faces,
-        vertex_normals=np.tile([0.0, 0.0, 1.0], (len(vertices_m), 1)),
+        vertex_normals=vertex_normals(vertices_m, faces),
         albedo_factor=(*colour, 255),
     )
 
@@ -94,21 +93,21 @@ def _log_camera(stream: rr.RecordingStream, name: str, camera: Camera) -> None:
 
 
 def _log_map(stream: rr.RecordingStream, scene: Scene) -> None:
-    half_x, half_y = scene.tissue.length_x_m / 2 * _MM, scene.tissue.width_y_m / 2 * _MM
+    outline = scene.tissue.shape.outline_m
     stream.log(
         "map/tissue",
-        rr.Boxes2D(centers=[(0, 0)], half_sizes=[(half_x, half_y)], colors=palette.TISSUE),
+        rr.LineStrips2D([_on_map(np.concatenate([outline, outline[:1]]))], colors=palette.TISSUE),
         static=True,
     )
     stream.log(
         "map/holes",
-        rr.Points2D(scene.holes_xy_m * (_MM, -_MM), colors=(206, 210, 216), radii=1.0),
+        rr.Points2D(_on_map(scene.holes_xy_m[scene.is_hole]), colors=(206, 210, 216), radii=1.0),
         static=True,
     )
     stream.log(
         "map/roi",
         rr.LineStrips2D(
-            [_on_map(circle(scene.roi_center_m, scene.roi.radius_m))],
+            [_on_map(region_outline_m(scene))],
             colors=palette.ROI,
             radii=0.9,
         ),
@@ -116,9 +115,9 @@ def _log_map(stream: rr.RecordingStream, scene: Scene) -> None:
     )
 
 
-def _below(scene: Scene, xy_m: Floats) -> Floats:
-    """A hole's place (3,) just under the tissue at rest."""
-    return np.array([xy_m[0], xy_m[1], -scene.tissue.thickness_m - 0.0008])
+def _holes_below_m(scene: Scene) -> Floats:
+    """The holes' places (n, 3) just under the tissue at rest."""
+    return scene.holes_m - np.array([0.0, 0.0, 0.0008])
 
 
 def _on_map(points_m: Floats) -> Floats:

@@ -31,11 +31,10 @@ class Workspace:
     @staticmethod
     def of(scene: Scene) -> Workspace:
         """Everywhere the scene's manoeuvres can take the tissue, with 20 mm to spare."""
-        half = np.array([scene.tissue.length_x_m, scene.tissue.width_y_m]) / 2
+        low, high = scene.tissue.shape.low_m, scene.tissue.shape.high_m
         reach = max(scene.motion.fold_distance_m, scene.motion.move_limit_m) + 0.02
-        below = -scene.tissue.thickness_m - 0.02
         above = scene.motion.pull_height_m + 0.04
-        return Workspace(np.array([*(-half - reach), below]), np.array([*(half + reach), above]))
+        return Workspace(low - [reach, reach, 0.02], high + [reach, reach, above])
 
     def holds(self, points_m: Floats) -> NDArray[np.bool_]:
         """Which points (n, 3) lie inside; NaN is outside."""

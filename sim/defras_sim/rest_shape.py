@@ -52,6 +52,10 @@ class RestShape(Protocol):
     def high_m(self) -> Floats:
         """Largest coordinates (3,)."""
 
+    @property
+    def outline_m(self) -> Floats:
+        """The tissue's outline (k, 2) seen from above, once around."""
+
     def covers(self, xy_m: Floats) -> Mask:
         """At which of ``xy_m`` (n, 2) there is tissue."""
 
@@ -97,6 +101,10 @@ class Slab:
     @property
     def high_m(self) -> Floats:
         return np.array([*self._half_m, 0.0])
+
+    @property
+    def outline_m(self) -> Floats:
+        return self._half_m * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
     def covers(self, xy_m: Floats) -> Mask:
         inside: Mask = np.all(np.abs(xy_m) <= self._half_m + 1e-9, axis=-1)

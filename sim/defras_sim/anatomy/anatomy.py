@@ -23,6 +23,7 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
 from defras_sim.anatomy.curved_face import CurvedFace
+from defras_sim.anatomy.topology import Topology, length_m
 from defras_sim.geometry import Floats
 
 MeshName = Literal["twin", "actual"]
@@ -94,6 +95,13 @@ class Anatomy:
     @cached_property
     def high_m(self) -> Floats:
         return np.asarray(self.vertices_m.max(axis=0))
+
+    @cached_property
+    def outline_m(self) -> Floats:
+        """The outline (k, 2) of the upper face seen from above, once around."""
+        rims = Topology(self.upper.triangles).rims()
+        longest = max(rims, key=lambda rim: length_m(rim, self.vertices_m))
+        return np.asarray(self.vertices_m[longest][:, :2])
 
     def covers(self, xy_m: Floats) -> NDArray[np.bool_]:
         """At which of ``xy_m`` (n, 2) there is tissue."""

@@ -13,6 +13,7 @@ from defras_sim.tissue import grasp as grips
 from defras_sim.tissue import holes as attachments
 from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.bed import bed_under
+from defras_sim.tissue.curved_bed import bed_under_anatomy
 from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.grasp import Grasp, NothingToGrasp
 from defras_sim.tissue.hole_response import HoleResponse, hole_response
@@ -78,7 +79,11 @@ class TissueModel:
             for term in (body, gravity(body.points, tissue.density_kg_m3, tissue.gravity_m_s2))
         }
         if tissue.bed:
-            bed = bed_under(self.mesh, tissue)
+            bed: Term = (
+                bed_under(self.mesh, tissue)
+                if tissue.anatomy is None
+                else bed_under_anatomy(self.mesh, tissue.anatomy)
+            )
             self._terms[bed.name] = bed
         self._surface = surface_map(self.mesh, tissue)
         self._holes = Holes(self.mesh, scene)
