@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
-from defras_bt.cli.errors import OUTCOME_CODES, UserError
+from defras_bt.cli.errors import OUTCOME_CODES, ExitCode, UserError
 from defras_bt.cli.files import find, find_scene, folder_for
+from defras_bt.cli.interrupts import Interrupts
 from defras_bt.cli.plan import rehearsed, tell
+from defras_bt.executive.deadline import interrupting
 from defras_bt.executive.operation import WORLDS, Operation, operate
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, read_substitutes
 from defras_bt.executive.tree_file import read_tree
+from defras_bt.faults.faults import NO_FAULTS, FaultInjection
+from defras_bt.faults.file import read_faults
 from defras_bt.planning.english import plan_text
 from defras_bt.planning.plan import Plan
 from defras_bt.planning.preparation import needs_plan
 from defras_bt.recording.bag import BagRecorder
+from defras_bt.recording.composite import RecordingFailed
 from defras_bt.recording.decisions import DECISIONS_FILE, DecisionRecorder
 from defras_bt.recording.progress import EventPrinter, ProgressLine
 from defras_bt.recording.record import Recorder
@@ -28,6 +32,9 @@ from defras_bt.recording.report import ReportRecorder
 from defras_bt.recording.summary import SummaryRecorder
 from defras_bt.recording.timeline import TimelineRecorder
 from defras_sim.scene import Scene
+
+# A tick that learns and rehearses takes up to minutes; a leaf caught in a loop takes for ever.
+LONGEST_TICK_S = 600.0
 
 
 def run(
@@ -47,12 +54,16 @@ def run(
         Path | None,
         typer.Option(help="File that replaces nodes by scripts, to try out what would happen."),
     ] = None,
+    faults: Annotated[
+        str | None, typer.Option(help="Faults to inject: a file, or a shipped name.")
+    ] = None,
     approve: Annotated[bool, typer.Option("--approve", help="Ask before each plan.")] = False,
 ) -> None:
     """Retract the tissue until the region of interest is visible.
 
     Leaves run.rrd, recording.mcap, decisions.jsonl, run.json and report.html in --out. Exit code:
-    0 goal reached, 2 invalid input, 3 goal not reached, 4 a human was asked, 1 internal error.
+    0 goal reached, 2 invalid input, 3 goal not reached, 4 a human was asked, 1 internal error, or
+    goal reached but not everything could be recorded. Ctrl-C stops the arms and asks a human.
 
     Example: defras run demo --actual demo_actual --world bullet --out out/demo
     """
@@ -65,6 +76,9 @@ def run(
     tree_spec = read_tree(tree_file)
     substitutes = NOTHING_SUBSTITUTED if substitute is None else read_substitutes(substitute)
     substituted = substitutes.paths(tree_spec)
+    injected = NO_FAULTS
+    if faults is not None:
+        injected = read_faults(find(faults, "sim/faults"), believed.arms)
     recorded = file_recorders(out) if out is not None else ()
     console = Console(soft_wrap=True, highlight=False)
     prepared = rehearsed(
@@ -94,15 +108,45 @@ def run(
             f"scripts ({substitute}).",
             style="bold yellow",
         )
+    if injected.faults:
+        kinds = ", ".join(fault.kind for fault in injected.faults)
+        console.print(
+            f"A TRIAL, NOT AN OPERATION: faults are injected ({kinds}).", style="bold yellow"
+        )
     recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console), *recorded]
     asked: Callable[[Plan], bool] = _ask if approve else lambda plan: True
-    with stop_on_interrupt() as operator_stop:
-        summary = operate(operation, recorders, approve=asked, operator_stop=operator_stop)
+    try:
+        with Interrupts().heeded() as interrupts:
+            summary = operate(
+                operation,
+                recorders,
+                approve=asked,
+                operator_stop=interrupts.operator_stop,
+                faults=FaultInjection(injected, believed, seed),
+                deadline=interrupting(LONGEST_TICK_S),
+                finishing=interrupts.finishing,
+            )
+    except KeyboardInterrupt:
+        console.print("Ended by the operator; the arms were stopped first.", style="bold red")
+        raise typer.Exit(ExitCode.INTERNAL) from None
+    except RecordingFailed as failed:
+        console.print(f"Not everything was recorded: {failed}", style="bold red", markup=False)
+        raise typer.Exit(code_without_record(str(failed.summary.values["outcome"]))) from failed
     if out is not None:
         console.print(
             f"Written to {out}: run.rrd, recording.mcap, decisions.jsonl, run.json, report.html"
         )
     raise typer.Exit(OUTCOME_CODES[str(summary.values["outcome"])])
+
+
+def code_without_record(outcome: str) -> ExitCode:
+    """Exit code of a run that was not recorded whole.
+
+    A run that ended without its goal says that first. One that reached it did not leave what it
+    should have, and must not pass for a success.
+    """
+    code = OUTCOME_CODES[outcome]
+    return ExitCode.INTERNAL if code == ExitCode.GOAL else code
 
 
 def file_recorders(out: Path) -> list[Recorder]:
@@ -119,23 +163,6 @@ def file_recorders(out: Path) -> list[Recorder]:
         SummaryRecorder(out / "run.json"),
         ReportRecorder(out / "report.html"),
     ]
-
-
-@contextmanager
-def stop_on_interrupt() -> Iterator[Callable[[], str | None]]:
-    """Ctrl-C asks the executive to stop and hold; a second one ends the program."""
-    asked: list[str] = []
-
-    def on_interrupt(*_: object) -> None:
-        if asked:
-            raise KeyboardInterrupt
-        asked.append("the operator asked to stop")
-
-    before = signal.signal(signal.SIGINT, on_interrupt)
-    try:
-        yield lambda: asked[0] if asked else None
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _require_same_set_up(believed: Scene, truth: Scene) -> None:

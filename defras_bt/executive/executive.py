@@ -77,6 +77,10 @@ class Executive:
         self._refused_since_s: float | None = None
         self._last: TickRecord | None = None
 
+    def watch(self, visitor: py_trees.visitors.VisitorBase) -> None:
+        """Let ``visitor`` see every node of the tree as it is ticked."""
+        self._bt.add_visitor(visitor)
+
     def run(self) -> None:
         """Tick until there is an outcome; it stands on the blackboard then.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -11,21 +12,21 @@ import numpy as np
 
 from defras_bt.executive.blackboard import Blackboard, TickInputs
 from defras_bt.executive.context import Context
+from defras_bt.executive.deadline import Deadline
 from defras_bt.executive.executive import Executive
 from defras_bt.executive.perception import Perception
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
+from defras_bt.faults.faults import NO_FAULTS, FaultInjection
 from defras_bt.learning.buffer import KeyframeBuffer
 from defras_bt.learning.inverse import InverseEstimator
 from defras_bt.monitoring.warning import WarningMonitor
 from defras_bt.planning.plan import Plan
-from defras_bt.planning.planner import Planner
 from defras_bt.recording.composite import CompositeRecorder
 from defras_bt.recording.record import Recorder, RunInfo, RunSummary
 from defras_bt.recording.summary import SummaryRecorder
 from defras_bt.recording.versions import versions
 from defras_sim.retraction import GraspPoint, Rehearsal, Rehearser
 from defras_sim.scene import Scene
-from defras_sim.twin import Twin
 from defras_sim.worlds.model_world import ModelWorld
 from defras_sim.worlds.protocol import World
 
@@ -73,8 +74,14 @@ def operate(
     *,
     approve: Callable[[Plan], bool] = lambda plan: True,
     operator_stop: Callable[[], str | None] = lambda: None,
+    faults: FaultInjection | None = None,
+    deadline: Deadline = nullcontext,
+    finishing: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> RunSummary:
     """Run the operation to its outcome; every recorder is finished whatever happens.
+
+    ``faults`` go wrong on the way. ``deadline`` limits how long a tick may take on the wall.
+    ``finishing`` surrounds the finishing of the recorders, which nobody should interrupt.
 
     Raises:
         ValueError: nodes are substituted in a world that is not simulated.
@@ -88,9 +95,11 @@ def operate(
     believed = operation.scene.for_bullet() if operation.world == "bullet" else operation.scene
     world = make_world(operation.world, operation.actual, world_rng)
     try:
+        injected = faults or FaultInjection(NO_FAULTS, believed, operation.seed)
+        world = injected.world(world)
         summary_recorder = SummaryRecorder()
-        recorder = CompositeRecorder([summary_recorder, *recorders])
-        twin = Twin(believed)
+        recorder = CompositeRecorder([summary_recorder, *injected.recorders(recorders)])
+        twin = injected.twin(believed)
         monitor = WarningMonitor(believed)
         keyframes = KeyframeBuffer()
         board = Blackboard(_before_first_tick(world, operation.force_threshold_n))
@@ -98,7 +107,7 @@ def operate(
             board=board,
             twin=twin,
             monitor=monitor,
-            planner=Planner(believed),
+            planner=injected.planner(believed),
             estimator=InverseEstimator(),
             keyframes=keyframes,
             rehearse=TwinRehearsal(),
@@ -116,14 +125,20 @@ def operate(
             perception,
             recorder,
             operation.max_time_s,
+            deadline,
             substitutes=operation.substitutes,
         )
+        breaker = injected.breaker()
+        if breaker is not None:
+            executive.watch(breaker)
         recorder.start(_info(operation, executive, believed))
         try:
             executive.run()
         finally:
-            summary = summary_recorder.summary(board.outcome or "error", perf_counter() - started)
-            recorder.finish(summary)
+            with finishing():
+                wall_s = perf_counter() - started
+                summary = summary_recorder.summary(board.outcome or "error", wall_s)
+                recorder.finish(summary)
     finally:
         world.close()
     return summary

@@ -25,7 +25,19 @@ class RecordingFault:
 
 
 class RecordingFailed(ExceptionGroup[Exception]):
-    """Raised by ``finish`` after every recorder has finished, with all that went wrong."""
+    """Raised by ``finish`` after every recorder has finished, with all that went wrong.
+
+    ``summary`` is what the run came to nevertheless.
+    """
+
+    summary: RunSummary
+
+    def __new__(
+        cls, message: str, errors: Sequence[Exception], summary: RunSummary
+    ) -> RecordingFailed:
+        failed = super().__new__(cls, message, errors)
+        failed.summary = summary
+        return failed
 
 
 class CompositeRecorder:
@@ -66,7 +78,7 @@ class CompositeRecorder:
             self._guarded(recorder, "the end", partial(recorder.finish, summary))
         if self.faults:
             said = "; ".join(str(fault) for fault in self.faults)
-            raise RecordingFailed(said, [fault.error for fault in self.faults])
+            raise RecordingFailed(said, [fault.error for fault in self.faults], summary)
 
     def _guarded(self, recorder: Recorder, moment: str, call: Callable[[], None]) -> None:
         try:

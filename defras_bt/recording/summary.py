@@ -123,11 +123,15 @@ def write_run_json(path: Path, summary: RunSummary) -> None:
         RunFile.model_validate(dict(summary.values)).model_dump(by_alias=True), indent=2
     )
     part = path.with_name(path.name + ".part")
-    with part.open("w", encoding="utf-8") as stream:
-        stream.write(text + "\n")
-        stream.flush()
-        os.fsync(stream.fileno())
-    part.replace(path)
+    try:
+        with part.open("w", encoding="utf-8") as stream:
+            stream.write(text + "\n")
+            stream.flush()
+            os.fsync(stream.fileno())
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def read_run_json(path: Path) -> RunFile:
