@@ -236,6 +236,7 @@ class Executive:
             node_last_status=snapshot.last_status,
             node_code=snapshot.code,
             node_decider=snapshot.decider,
+            operator_stop=inputs.operator_stop,
             cause=snapshot.cause,
             stopped_by=snapshot.stopped_by,
             ended=board.outcome_cause,

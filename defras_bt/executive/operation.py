@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
+from defras_bt.executive.again import again_values
 from defras_bt.executive.blackboard import Blackboard, TickInputs
 from defras_bt.executive.context import Context
 from defras_bt.executive.deadline import Deadline
@@ -90,10 +91,40 @@ def operate(
     """
     if operation.substitutes.entries and operation.world not in SIMULATED_WORLDS:
         raise ValueError(f"nodes can be substituted in {', '.join(SIMULATED_WORLDS)} only")
-    started = perf_counter()
-    world_rng, learning_rng = np.random.default_rng(operation.seed).spawn(2)
+    world_rng, learning_rng = random_generators(operation.seed)
     believed = operation.scene.for_bullet() if operation.world == "bullet" else operation.scene
     world = make_world(operation.world, operation.actual, world_rng)
+    return operate_in(
+        world,
+        replace(operation, scene=believed),
+        learning_rng,
+        recorders,
+        approve=approve,
+        operator_stop=operator_stop,
+        faults=faults,
+        deadline=deadline,
+        finishing=finishing,
+    )
+
+
+def operate_in(
+    world: World,
+    operation: Operation,
+    learning_rng: np.random.Generator,
+    recorders: Sequence[Recorder] = (),
+    *,
+    approve: Callable[[Plan], bool] = lambda plan: True,
+    operator_stop: Callable[[], str | None] = lambda: None,
+    faults: FaultInjection | None = None,
+    deadline: Deadline = nullcontext,
+    finishing: Callable[[], AbstractContextManager[None]] = nullcontext,
+) -> RunSummary:
+    """As :func:`operate`, in a world that is there already; it is closed at the end.
+
+    ``operation.scene`` is what the twin believes, to the last detail.
+    """
+    started = perf_counter()
+    believed = operation.scene
     try:
         injected = faults or FaultInjection(NO_FAULTS, believed, operation.seed)
         world = injected.world(world)
@@ -144,6 +175,12 @@ def operate(
     return summary
 
 
+def random_generators(seed: int) -> tuple[np.random.Generator, np.random.Generator]:
+    """Independent generators for the world and for learning."""
+    world_rng, learning_rng = np.random.default_rng(seed).spawn(2)
+    return world_rng, learning_rng
+
+
 def make_world(name: str, actual: Scene, rng: np.random.Generator) -> World:
     """The world called ``name`` with the patient as it really is.
 
@@ -189,4 +226,5 @@ def _info(operation: Operation, executive: Executive, believed: Scene) -> RunInf
         versions=versions(),
         believed=believed.attached,
         substituted=executive.substituted,
+        again=again_values(operation),
     )

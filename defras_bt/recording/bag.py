@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from defras_bt.recording import ros_messages as ros
+from defras_bt.recording.inputs import INPUTS_TOPIC, SETUP_TOPIC, input_text, setup_text
 from defras_bt.recording.mcap_file import McapFile
 from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
-from defras_sim.worlds.protocol import ArmObservation
+from defras_sim.worlds.protocol import ArmObservation, PointCloud
 
 # A killed process loses at most the messages of so many ticks; see mcap_file for the rest.
 _FLUSH_EVERY = 20
@@ -28,15 +29,20 @@ class BagRecorder:
         self._file: McapFile | None = None
         self._channels: dict[str, int] = {}
         self._stamps: dict[str, float] = {}
+        self._cloud: PointCloud | None = None
+        self._clouds = 0
 
     def start(self, info: RunInfo) -> None:
         self._file = McapFile(self._path)
+        self._write_text(SETUP_TOPIC, 0.0, setup_text(info))
 
     def tick(self, record: TickRecord) -> None:
         now_s, seen = record.time_s, record.observation
         for name, arm in seen.arms.items():
             self._write_arm(f"/{name.upper()}", now_s, arm)
-        if seen.cloud is not None and self._is_new("/tissue/points", seen.cloud.stamp_s):
+        if seen.cloud is not None and _differs(seen.cloud, self._cloud):
+            self._cloud = seen.cloud
+            self._clouds += 1
             stamp_s = seen.cloud.stamp_s
             message = ros.cloud_message(stamp_s, seen.cloud.points_m)
             self._write("/tissue/points", ros.CLOUD, now_s, stamp_s, message)
@@ -46,6 +52,8 @@ class BagRecorder:
             stamp_s = now_s if seen_s is None else seen_s
             if self._is_new(topic, stamp_s):
                 self._write(topic, ros.NUMBER, now_s, stamp_s, ros.number_message(visible))
+        cloud = None if seen.cloud is None else self._clouds - 1
+        self._write_text(INPUTS_TOPIC, now_s, input_text(record, cloud))
         if record.tick % _FLUSH_EVERY == 0:
             self._opened().flush()
 
@@ -75,6 +83,9 @@ class BagRecorder:
             message = ros.flag_message(seen.grasped)
             self._write(f"{arm}/grasped", ros.FLAG, now_s, stamp_s, message)
 
+    def _write_text(self, topic: str, now_s: float, text: str) -> None:
+        self._write(topic, ros.TEXT, now_s, now_s, ros.text_message(text))
+
     def _is_new(self, reading: str, stamp_s: float) -> bool:
         if self._stamps.get(reading) == stamp_s:
             return False
@@ -95,3 +106,9 @@ class BagRecorder:
         if self._file is None:
             raise RuntimeError("a tick came before the start of the run: call start first")
         return self._file
+
+
+def _differs(cloud: PointCloud, last: PointCloud | None) -> bool:
+    return last is None or not (
+        cloud.stamp_s == last.stamp_s and np.array_equal(cloud.points_m, last.points_m)
+    )

@@ -25,7 +25,7 @@ class Series:
 
     ``time_s`` (n,) when recorded; ``stamp_s`` (n,) when measured (``time_s`` where the message has
     no header). ``values`` (n, columns). A cloud's values are empty and ``points_m`` holds an array
-    (points, 3) per message.
+    (points, 3) per message; those of strings are empty, and ``texts`` holds them.
     """
 
     message_type: str
@@ -35,6 +35,7 @@ class Series:
     columns: tuple[str, ...]
     values: Floats
     points_m: tuple[Floats, ...] = ()
+    texts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def _series(
     columns = content[0][0]
     if any(names != columns for names, _ in content):
         raise ValueError(f"{message_type}: the columns change within one topic, first {columns}")
-    is_cloud = message_type.endswith("PointCloud2")
+    is_cloud, is_text = message_type.endswith("PointCloud2"), message_type.endswith("String")
     rows = [row for _, row in content]
     return Series(
         message_type=message_type,
@@ -102,8 +103,9 @@ def _series(
         time_s=time_s,
         stamp_s=stamp_s,
         columns=columns,
-        values=np.zeros((len(rows), 0)) if is_cloud else np.array(rows, float),
+        values=np.zeros((len(rows), 0)) if is_cloud or is_text else np.array(rows, float),
         points_m=tuple(rows) if is_cloud else (),
+        texts=tuple(rows) if is_text else (),
     )
 
 
@@ -128,6 +130,10 @@ def _wrench(message: Any) -> tuple[tuple[str, ...], Any]:
 
 def _plain(message: Any) -> tuple[tuple[str, ...], Any]:
     return ("data",), (float(message.data),)
+
+
+def _text(message: Any) -> tuple[tuple[str, ...], Any]:
+    return ("data",), str(message.data)
 
 
 def _cloud(message: Any) -> tuple[tuple[str, ...], Any]:
@@ -157,4 +163,5 @@ _READERS: dict[str, Callable[[Any], tuple[tuple[str, ...], Any]]] = {
     "sensor_msgs/msg/PointCloud2": _cloud,
     "std_msgs/msg/Bool": _plain,
     "std_msgs/msg/Float64": _plain,
+    "std_msgs/msg/String": _text,
 }

@@ -61,9 +61,9 @@ class TickRecord:
     last status it had, and ``node_decider`` to the child that decided it. ``cause`` is the leaf
     that decided the whole tree; ``stopped_by`` the one because of which no plan is carried out,
     None while one is, or where nobody asked. ``ended`` is why the run ended with this tick, None
-    while it goes on. ``operator`` is "autonomous", "paused", "taken_over" or
-    "stopped". ``sent`` left the gate; ``proposed`` came from the
-    tree. ``believed`` (holes,) marks the attachments believed now. ``plan`` is the latest plan,
+    while it goes on. ``operator`` is "autonomous", "paused", "taken_over" or "stopped",
+    ``operator_stop`` why. ``sent`` left the gate; ``proposed`` came from the tree. ``believed``
+    (holes,) marks the attachments believed now. ``plan`` is the latest plan,
     ``plan_step`` the 0-based index of the action in it that is carried out, None while none is.
     """
 
@@ -91,6 +91,7 @@ class TickRecord:
     stopped_by: Cause | None = None
     ended: Cause | None = None
     operator: str = "autonomous"
+    operator_stop: str | None = None
 
     @property
     def action(self) -> Action | None:
@@ -107,6 +108,7 @@ class RunInfo:
     ``tree_paths`` lists (path, kind) of every node at the start. ``actual`` is None where nobody
     knows it. ``metric`` is None for a tree without monitoring. ``versions``: package to version.
     ``substituted`` lists the paths of nodes that only say what a script tells them.
+    ``again`` holds, as plain values, what else is needed to decide everything once more.
     """
 
     scene: Scene
@@ -122,6 +124,7 @@ class RunInfo:
     versions: Mapping[str, str]
     believed: NDArray[np.bool_]
     substituted: tuple[str, ...] = ()
+    again: Mapping[str, Any] = field(default_factory=dict)
 
     def warning_state(self, reading: MonitorReading | None) -> int | None:
         """The state that the run's tree listens to; None if it has none, or nothing was read."""

@@ -18,6 +18,7 @@ JOINT = "sensor_msgs/msg/JointState"
 CLOUD = "sensor_msgs/msg/PointCloud2"
 FLAG = "std_msgs/msg/Bool"
 NUMBER = "std_msgs/msg/Float64"
+TEXT = "std_msgs/msg/String"
 
 _FLOAT32 = 7
 
@@ -81,6 +82,10 @@ def flag_message(value: bool) -> bytes:
 
 def number_message(value: float) -> bytes:
     return encoded(NUMBER, TYPES.types[NUMBER](float(value)))
+
+
+def text_message(text: str) -> bytes:
+    return encoded(TEXT, TYPES.types[TEXT](text))
 
 
 def _header(stamp_s: float) -> Any:

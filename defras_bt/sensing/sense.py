@@ -34,8 +34,10 @@ def sense(
     """Fill in cloud and region visibility; what a world delivers ready-made passes through.
 
     Bad data never raises: it ends up as None with a sentence in ``faults``, and whoever needs the
-    reading has to treat None as a tripped guard.
+    reading has to treat None as a tripped guard. What was sensed already, as from a recording, stays so.
     """
+    if isinstance(observation, SensedObservation):
+        return observation
     taken = {entry.name: getattr(observation, entry.name) for entry in fields(Observation)}
     sensed = _with_visibility(SensedObservation(**taken), scene, colours)
     return _with_cloud(sensed, scene, colours)
@@ -53,7 +55,9 @@ def _with_cloud(
         except ValueError as fault:
             return _faulty(sensed, f"no cloud: {fault}")
     assert cloud is not None
-    points = np.asarray(cloud.points_m, float)
+    # Depth cameras measure, and recordings keep, no more than single precision.
+    with np.errstate(over="ignore"):  # what is too large for that is dropped as infinite
+        points = np.asarray(cloud.points_m, np.float32).astype(np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
         shape = points.shape
         return _faulty(
@@ -75,9 +79,8 @@ def _with_cloud(
             "metres and in the tissue frame"
         )
         return _faulty(replace(sensed, cloud=None, dropped_points=dropped), reason)
-    if not possible.all() or cloud is not sensed.cloud:
-        cloud = PointCloud(cloud.stamp_s, points[possible])
-    return replace(sensed, cloud=cloud, dropped_points=dropped)
+    sound = PointCloud(cloud.stamp_s, points[possible])
+    return replace(sensed, cloud=sound, dropped_points=dropped)
 
 
 def _with_visibility(

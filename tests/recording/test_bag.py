@@ -28,6 +28,8 @@ ARM_TOPICS = (
 TOPICS = {f"/PSM{i}/{topic}" for i in (1, 2) for topic in ARM_TOPICS} | {
     "/tissue/points",
     "/endoscope/roi_visibility",
+    "/executive/setup",
+    "/executive/inputs",
 }
 
 
@@ -151,7 +153,7 @@ def test_a_ros_1_bag_is_read_and_strangers_are_named(tmp_path: Path) -> None:
     with Ros1Writer(tmp_path / "lab.bag") as writer:
         for topic, message in (
             ("/PSM1/jaw/measured_js", jaw),
-            ("/rosout", types["std_msgs/msg/String"](data="hello")),
+            ("/colour", types["std_msgs/msg/ColorRGBA"](1.0, 0.0, 0.0, 1.0)),
         ):
             kind = message.__msgtype__
             connection = writer.add_connection(topic, kind, typestore=store)
@@ -160,4 +162,4 @@ def test_a_ros_1_bag_is_read_and_strangers_are_named(tmp_path: Path) -> None:
     series = bag["/PSM1/jaw/measured_js"]
     assert (series.time_s[0], series.stamp_s[0], series.values[0, 0]) == (13.0, 12.5, 0.3)
     assert series.frame_id == "PSM1_base"
-    assert bag.skipped == (("/rosout", "std_msgs/msg/String"),)
+    assert bag.skipped == (("/colour", "std_msgs/msg/ColorRGBA"),)

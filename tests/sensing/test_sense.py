@@ -36,10 +36,22 @@ def picture(rgb: tuple[int, int, int], depth_m: float) -> CameraImage:
     )
 
 
+SINGLE = POINTS.astype(np.float32).astype(float)
+"""What a depth camera's numbers can hold."""
+
+
+def test_what_was_sensed_already_stays_as_it_is() -> None:
+    sensed = sense(replace(ready_made(), cloud=None), SCENE)
+    assert sensed.faults
+    assert sense(sensed, SCENE) is sensed
+
+
 def test_ready_made_readings_pass_through_untouched() -> None:
     given = ready_made()
     sensed = sense(given, SCENE)
-    assert sensed.cloud is given.cloud
+    assert sensed.cloud is not None
+    assert sensed.cloud.stamp_s == given.cloud.stamp_s
+    np.testing.assert_array_equal(sensed.cloud.points_m, SINGLE)
     assert (sensed.roi_visibility, sensed.roi_visibility_stamp_s) == (0.4, 1.9)
     assert sensed.faults == ()
     assert sensed.dropped_points == 0
@@ -117,4 +129,4 @@ def test_a_few_points_elsewhere_are_left_out() -> None:
     points = np.vstack([POINTS, np.full((10, 3), 0.3)])
     sensed = sense(replace(ready_made(), cloud=PointCloud(1.9, points)), SCENE)
     assert sensed.cloud is not None
-    np.testing.assert_array_equal(sensed.cloud.points_m, POINTS)
+    np.testing.assert_array_equal(sensed.cloud.points_m, SINGLE)

@@ -1,0 +1,70 @@
+"""What a run starts from besides its scene, as plain values and back, so that it can run again.
+
+Tree files travel with the recording: a replay a year later must not depend on what has become of
+them since.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import TypeAdapter
+
+from defras_bt.executive.substitution import Substitute, Substitutes
+from defras_bt.executive.tree_file import read_tree
+from defras_bt.planning.plan import Plan
+
+if TYPE_CHECKING:
+    from defras_bt.executive.operation import Operation
+
+_PLAN: TypeAdapter[Plan | None] = TypeAdapter(Plan | None)
+
+
+def again_values(operation: Operation) -> Mapping[str, Any]:
+    """For :attr:`~defras_bt.recording.record.RunInfo.again`."""
+    return {
+        "tree": tree_files(operation.tree_file),
+        "max_time_s": operation.max_time_s,
+        "preoperative": _PLAN.dump_python(operation.preoperative, mode="json"),
+        "substitutes": [
+            entry.model_dump(mode="json", exclude_unset=True)
+            for entry, _ in operation.substitutes.entries
+        ],
+    }
+
+
+def recorded_plan(again: Mapping[str, Any]) -> Plan | None:
+    """The plan that was made before the operation."""
+    return _PLAN.validate_python(again["preoperative"])
+
+
+def recorded_substitutes(again: Mapping[str, Any], file: Path) -> Substitutes:
+    """Which nodes were substituted; ``file``: where that stands."""
+    entries = (Substitute.model_validate(entry) for entry in again["substitutes"])
+    return Substitutes(tuple((entry, (file, 1, 1)) for entry in entries))
+
+
+def tree_files(main: Path) -> Mapping[str, Any]:
+    """The text of a tree file and of everything it includes, by path from their common folder."""
+    files = {main.resolve(), *(node.place[0].resolve() for _, node in read_tree(main).root.walk())}
+    folder = Path(os.path.commonpath([file.parent for file in files]))
+    return {
+        "main": str(main.resolve().relative_to(folder)),
+        "files": {
+            str(file.relative_to(folder)): file.read_text(encoding="utf-8")
+            for file in sorted(files)
+        },
+    }
+
+
+def unpack_tree(again: Mapping[str, Any], folder: Path) -> Path:
+    """Write the recorded tree files into ``folder``; returns the one that was run."""
+    tree = again["tree"]
+    for name, text in tree["files"].items():
+        file = folder / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+    return folder / str(tree["main"])
