@@ -34,7 +34,7 @@ def sense(
     """Fill in cloud and region visibility; what a world delivers ready-made passes through.
 
     Bad data never raises: it ends up as None with a sentence in ``faults``, and whoever needs the
-    reading has to treat None as a tripped guard. What was sensed already, as from a recording, stays so.
+    reading has to treat None as a tripped guard. What was sensed already, as in a recording, stays.
     """
     if isinstance(observation, SensedObservation):
         return observation
