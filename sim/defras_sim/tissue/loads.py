@@ -36,8 +36,10 @@ class DeadLoad:
         return NO_PAIRS
 
     def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
+        if self.strength == 0.0:
+            return 0.0, np.zeros_like(positions_m)
         gradient = -self.strength * self.forces_n
-        return float(np.sum(gradient * (positions_m - self.rest_m))), gradient
+        return float(np.vdot(gradient, positions_m - self.rest_m)), gradient
 
     def add_tangent(self, positions_m: Floats, places: Places, entries: Floats) -> None:
         """A force that does not depend on the positions has no second derivative."""

@@ -38,6 +38,17 @@ ROW_SHIFTS: Floats = np.array([1.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
+class _Acting:
+    """Those of some springs that pull: most holes of a scene are free."""
+
+    which: Integers
+    rows: sparse.csr_array
+    columns: sparse.csr_array
+    """The rows, transposed."""
+    stiffness_n_per_m: Floats
+
+
+@dataclass(frozen=True)
 class Springs:
     """Linear springs on weighted means of positions.
 
@@ -53,17 +64,23 @@ class Springs:
 
     def energy_and_gradient(self, positions_m: Floats, targets_m: Floats) -> tuple[float, Floats]:
         """Energy [J] and its gradient (nodes, 3) [N]."""
-        stretch = targets_m - self.rows @ positions_m
-        force = self.stiffness_n_per_m[:, None] * stretch
-        return 0.5 * float(np.sum(force * stretch)), -(self.rows.T @ force)
+        acting = self._acting
+        stretch = targets_m[acting.which] - acting.rows @ positions_m
+        force = acting.stiffness_n_per_m[:, None] * stretch
+        return 0.5 * float(np.vdot(force, stretch)), -(acting.columns @ force)
+
+    @cached_property
+    def _acting(self) -> _Acting:
+        which = np.flatnonzero(self.stiffness_n_per_m > 0)
+        rows = self.rows[which]
+        return _Acting(which, rows, sparse.csr_array(rows.T), self.stiffness_n_per_m[which])
 
     @cached_property
     def _coupling(self) -> sparse.coo_array:
-        """Second derivative by one coordinate (nodes, nodes) [N/m]; those of springs that act."""
-        acting = self.stiffness_n_per_m > 0
-        rows = self.rows[acting]
-        scaled = rows.multiply(self.stiffness_n_per_m[acting, None])
-        return sparse.coo_array(rows.T @ scaled)
+        """Second derivative by one coordinate (nodes, nodes) [N/m]."""
+        acting = self._acting
+        scaled = acting.rows.multiply(acting.stiffness_n_per_m[:, None])
+        return sparse.coo_array(acting.columns @ scaled)
 
     @cached_property
     def pairs(self) -> Integers:

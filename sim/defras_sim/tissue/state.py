@@ -21,7 +21,11 @@ class Wrench:
     @staticmethod
     def of(forces_n: Floats, at_m: Floats) -> Wrench:
         """Of forces (n, 3) that act at points (n, 3)."""
-        return Wrench(forces_n.sum(axis=0), np.cross(at_m, forces_n).sum(axis=0))
+        turn = at_m.T @ forces_n  # (3, 3): its antisymmetric part is the moment
+        moment_nm = np.array(
+            [turn[1, 2] - turn[2, 1], turn[2, 0] - turn[0, 2], turn[0, 1] - turn[1, 0]]
+        )
+        return Wrench(np.ones(len(forces_n)) @ forces_n, moment_nm)
 
 
 NO_WRENCH = Wrench(np.zeros(3), np.zeros(3))
