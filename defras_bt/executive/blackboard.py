@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from defras_bt.executive.ports import PortValues
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import GridPoint, Plan
 from defras_bt.recording.record import Cause, Event, Level
@@ -73,7 +74,8 @@ class Blackboard:
     recovery could not do.
     ``plan_belief`` (holes,) marks the attachments that the plan was made with; ``plan_exposing``
     lists the manoeuvres after which it counts on seeing the region. ``new_plan`` waits for the
-    executive to put it into the tree after the tick.
+    executive to put it into the tree after the tick. ``ports`` holds what leaves hand to each other
+    under keys of their tree.
     """
 
     inputs: TickInputs
@@ -82,6 +84,7 @@ class Blackboard:
     rate: float = 1.0
     events: list[Event] = field(default_factory=list)
     failure: Cause | None = None
+    ports: PortValues = field(default_factory=PortValues)
 
     plan: Plan | None = None
     new_plan: Plan | None = None

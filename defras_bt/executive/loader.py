@@ -15,6 +15,7 @@ from defras_bt.executive.registry import NODES, Registry
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.executive.tree_kinds import KINDS, kind_of
 from defras_bt.executive.tree_spec import MetricName, NodeSpec, TreeSpec
+from defras_sim.yaml_source import Fault, InvalidFile
 
 if TYPE_CHECKING:
     from defras_bt.executive.context import Context
@@ -46,13 +47,22 @@ def load_tree(file: Path, context: Context, registry: Registry = NODES) -> Loade
     """Read a tree file and make its behaviours; every leaf is given ``context``.
 
     Raises:
-        InvalidFile: with everything that is wrong with the file and those it includes.
+        InvalidFile: with everything that is wrong with the file and those it includes, or with the
+            ports that only a tree that includes this one can fill.
     """
-    return build_tree(read_tree(file, registry), context)
+    tree = read_tree(file, registry)
+    if tree.needs:
+        raise InvalidFile(
+            Fault(*place, f"port {key!r} has no value: this tree can only be included by another")
+            for key, place in tree.needs.items()
+        )
+    return build_tree(tree, context)
 
 
 def build_tree(tree: TreeSpec, context: Context) -> LoadedTree:
-    """Make the behaviours of a tree that was read and checked."""
+    """Make the behaviours of a tree that was read and checked, and give its ports their values."""
+    for key, value in tree.values.items():
+        context.board.ports.write(key, value)
     root = _build(tree.root, context)
     slots = [behaviour for behaviour, _ in walk(root) if isinstance(behaviour, PlanSlot)]
     return LoadedTree(tree.name, root, slots[0] if slots else None, tree.metric)
@@ -68,6 +78,8 @@ def walk(root: Behaviour, above: str = "") -> Iterator[tuple[Behaviour, str]]:
 
 def _build(spec: NodeSpec, context: Context) -> Behaviour:
     if spec.node_class is not None:
-        return spec.node_class(spec.name, context, spec.options)
+        leaf = spec.node_class(spec.name, context, spec.options)
+        leaf.keys = {**leaf.keys, **spec.keys}
+        return leaf
     children = [_build(child, context) for child in spec.children]
     return KINDS[spec.kind].build(spec.name, spec.options, children)

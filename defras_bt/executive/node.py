@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import py_trees
 from py_trees.common import Status
 from pydantic import BaseModel, ConfigDict
 
+from defras_bt.executive.ports import PortUnset, Writes, ports_of
 from defras_bt.recording.record import Cause
 
 if TYPE_CHECKING:
@@ -52,7 +53,11 @@ class Node(py_trees.behaviour.Behaviour):
     reports; ``opens_jaws``, for a leaf that commands jaws although it is no motion; and
     :meth:`promise`.
 
+    Values that leaves hand to each other are ports (ports.py), declared as class attributes.
+
     Attributes:
+        keys: under which key of the blackboard each port stands; a tree file may choose others
+            than the names of the ports.
         code: reason of the last status, for counting and recovery: a member of
             :class:`~defras_bt.executive.reasons.Code`, or of a package's own ``ReasonCode``.
         feedback_message: the same for people, with numbers and units.
@@ -80,6 +85,9 @@ class Node(py_trees.behaviour.Behaviour):
         super().__init__(name)
         self.context = context
         self.parameters = parameters
+        ports = ports_of(type(self))
+        self.keys: Mapping[str, str] = {port: port for port in ports}
+        self._writes = tuple(port for port in ports.values() if isinstance(port, Writes))
         self.code = ""
         self.reported_status = Status.INVALID
         self._reported = False
@@ -90,7 +98,17 @@ class Node(py_trees.behaviour.Behaviour):
         return Cause(self.code, self.feedback_message)
 
     def succeed(self, code: str, message: str) -> Status:
-        """Report SUCCESS: done, or (guard) motion may go on."""
+        """Report SUCCESS: done, or (guard) motion may go on.
+
+        Raises:
+            PortUnset: nothing was ever written to one of the ports that the leaf writes.
+        """
+        for port in self._writes:
+            if self.keys[port.name] not in self.context.board.ports:
+                raise PortUnset(
+                    f"{type(self).__name__} {self.name!r} succeeds without having written its "
+                    f"port {port.name!r}, on which other leaves count"
+                )
         return self._report(Status.SUCCESS, code, message)
 
     def fail(self, code: str, message: str) -> Status:

@@ -11,9 +11,11 @@ from importlib.metadata import entry_points
 from types import MappingProxyType
 from typing import TypeVar, get_args
 
+from py_trees.behaviours import Dummy
 from pydantic import BaseModel
 
 from defras_bt.executive.node import Node, Role
+from defras_bt.executive.ports import ports_of
 
 NodeClass = TypeVar("NodeClass", bound=type[Node])
 
@@ -26,11 +28,14 @@ BUILTIN_NODE_MODULES: tuple[str, ...] = (
     "defras_bt.learning.nodes",
     "defras_bt.planning.nodes",
     "defras_bt.executive.nodes",
+    "defras_bt.executive.port_nodes",
 )
 """Modules whose import registers the nodes that come with this project."""
 
 ENTRY_POINT_GROUP = "defras.nodes"
 """Entry points of users' packages; each names a module whose import registers nodes."""
+
+_NAMES_IN_EVERY_NODE = frozenset(dir(Node)) | frozenset(vars(Dummy()))
 
 _CLASS_NAME = re.compile(r"([A-Z][a-z0-9]*)+")
 
@@ -139,4 +144,10 @@ def _unfit(node_class: type[Node]) -> str | None:
         return "has Parameters that are not a pydantic model with extra='forbid'"
     if "name" in parameters.model_fields:
         return "has a parameter 'name': tree files use that key for the node's own name"
+    ports = ports_of(node_class)
+    if ports and "ports" in parameters.model_fields:
+        return "has a parameter 'ports': tree files use that key for the keys of its ports"
+    taken = sorted(set(ports) & _NAMES_IN_EVERY_NODE)
+    if taken:
+        return f"has a port called {taken[0]!r}, as something in every node is called"
     return None

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from defras_bt.executive.registry import did_you_mean
-from defras_bt.executive.tree_spec import Place
+from defras_bt.executive.tree_spec import Place, Wire
 from defras_sim.yaml_source import Fault, Location, YamlSource
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -36,6 +36,29 @@ class FieldChecker:
             )
             return None
         return str(name)
+
+    def wires(self, at: Location, kind: str, body: Mapping[Any, Any]) -> dict[str, Wire] | None:
+        """What stands under ``ports``: a key or a value for each; None after noting a fault."""
+        given = body.get("ports", {})
+        if not isinstance(given, dict):
+            self.fault((*at, "ports"), f"{kind}.ports: should be keys and values, not {given!r}")
+            return None
+        wires = {}
+        for port, said in given.items():
+            where = (*at, "ports", port)
+            if isinstance(said, str) and re.fullmatch(NAME_PATTERN, said):
+                wires[str(port)] = Wire(self.place(where), key=said)
+            elif isinstance(said, (bool, int, float)):
+                wires[str(port)] = Wire(self.place(where), value=said)
+            elif isinstance(said, dict) and list(said) == ["value"]:
+                wires[str(port)] = Wire(self.place(where), value=said["value"])
+            else:
+                self.fault(
+                    where,
+                    f"{kind}.ports.{port}: give a key (small letters, digits and _), a number, or "
+                    f"{{value: ...}}, not {said!r}",
+                )
+        return wires if len(wires) == len(given) else None
 
     def checked(
         self,

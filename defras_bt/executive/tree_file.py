@@ -21,46 +21,23 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field
-
-from defras_bt.executive.node import NodeParameters
+from defras_bt.executive.ports import ports_of
 from defras_bt.executive.registry import NODES, Registry, did_you_mean, snake_case
 from defras_bt.executive.tree_check import check_tree
-from defras_bt.executive.tree_fields import NAME_PATTERN, FieldChecker
+from defras_bt.executive.tree_fields import FieldChecker
+from defras_bt.executive.tree_header import SUBTREE, SubtreeOptions, TreeHeader
 from defras_bt.executive.tree_kinds import KINDS, Kind
-from defras_bt.executive.tree_spec import MetricName, NodeSpec, TreeSpec
+from defras_bt.executive.tree_port_flow import unwritten_reads
+from defras_bt.executive.tree_ports import Wiring
+from defras_bt.executive.tree_spec import NodeSpec, Place, Scope, TreeSpec, Wire
 from defras_sim.yaml_source import Fault, InvalidFile, Location, read_yaml
-
-SUBTREE = "subtree"
-"""The kind that stands for the tree of another file."""
 
 _DEEPEST = 64
 """Levels of nesting, includes counted; deeper is a mistake, and would exhaust Python's stack."""
-
-
-class TreeHeader(NodeParameters):
-    """Top level of a tree file."""
-
-    name: str = Field(pattern=NAME_PATTERN, description="Name of the tree and its topmost node.")
-    description: str = Field(default="", description="What the tree does, for people.")
-    metric: MetricName | None = Field(
-        default=None,
-        description="The discrepancy whose warning states count; left out: no monitoring.",
-    )
-    tree: Any = Field(description="The topmost node.")
-
-
-class SubtreeOptions(NodeParameters):
-    """Which file to put here."""
-
-    file: str = Field(
-        pattern=r"^[^\x00-\x1f]+\.ya?ml$",
-        description="Another tree file (.yaml), relative to this one.",
-    )
 
 
 def read_tree(file: Path, registry: Registry = NODES, *, must_be_guarded: bool = True) -> TreeSpec:
@@ -77,6 +54,9 @@ def read_tree(file: Path, registry: Registry = NODES, *, must_be_guarded: bool =
     source = read_yaml(file)
     tree = _Reader(source, faults, registry=registry, including=(file.resolve(),)).tree()
     if tree is not None and not faults:
+        tree = Wiring(faults).wired(tree)
+    if tree is not None and not faults:
+        faults.extend(unwritten_reads(tree))
         guard_names = [name for name, node in registry.nodes().items() if node.role == "guard"]
         faults.extend(check_tree(tree.root, guard_names, must_be_guarded=must_be_guarded))
     if tree is None or faults:
@@ -92,6 +72,8 @@ class _Reader(FieldChecker):
     registry: Registry
     including: tuple[Path, ...]
     depth: int = 0
+    given: Mapping[str, Wire] | None = None
+    included_at: Place | None = None
 
     def tree(self, called: str | None = None) -> TreeSpec | None:
         """The tree of this file, its topmost node ``called`` otherwise than the file says."""
@@ -102,6 +84,12 @@ class _Reader(FieldChecker):
         root = self.node(("tree",), self.source.data["tree"], self.depth, name)
         if header is None or root is None:
             return None
+        declared = {
+            name: (self.place(("ports", name)), port) for name, port in header.ports.items()
+        }
+        place = self.included_at or self.place(())
+        scope = Scope(self.source.file, declared, self.given, place)
+        root = replace(root, scopes=(scope, *root.scopes))
         return TreeSpec(header.name, header.description, root, header.metric)
 
     def node(
@@ -149,10 +137,17 @@ class _Reader(FieldChecker):
     ) -> NodeSpec | None:
         node_class = self.registry.look_up(kind)
         name = called or self.name(at, kind, body, snake_case(kind))
-        options = self.checked(at, body, node_class.Parameters, kind, ("name",))
-        if name is None or options is None:
+        ports = ports_of(node_class)
+        own_keys = ("name", "ports") if ports else ("name",)
+        options = self.checked(at, body, node_class.Parameters, kind, own_keys)
+        wires = self.wires(at, kind, body) if ports else {}
+        for port in wires or ():
+            if port not in ports:
+                message = f"{kind} has no port {port!r}{did_you_mean(port, ports)}"
+                self.fault((*at, "ports", port), message)
+        if name is None or options is None or wires is None:
             return None
-        return NodeSpec(kind, name, self.place(at), options, node_class=node_class)
+        return NodeSpec(kind, name, self.place(at), options, node_class=node_class, wires=wires)
 
     def inner(
         self, at: Location, kind: Kind, body: Mapping[Any, Any], depth: int, called: str | None
@@ -207,8 +202,9 @@ class _Reader(FieldChecker):
         self, at: Location, body: Mapping[Any, Any], depth: int, called: str | None
     ) -> NodeSpec | None:
         name = called or self.name(at, SUBTREE, body, "")
-        options = self.checked(at, body, SubtreeOptions, SUBTREE, ("name",))
-        if name is None or options is None:
+        options = self.checked(at, body, SubtreeOptions, SUBTREE, ("name", "ports"))
+        wires = self.wires(at, SUBTREE, body)
+        if name is None or options is None or wires is None:
             return None
         folder = self.source.file.parent
         file = folder / options.file
@@ -232,6 +228,8 @@ class _Reader(FieldChecker):
             registry=self.registry,
             including=(*self.including, file.resolve()),
             depth=depth,
+            given=wires,
+            included_at=self.place(at),
         ).tree(name or None)
         return None if tree is None else tree.root
 

@@ -15,9 +15,10 @@ from typing import Any
 from pydantic import BaseModel
 
 from defras_bt.executive.node import Node
+from defras_bt.executive.ports import Port, ports_of
 from defras_bt.executive.registry import builtin_nodes
 from defras_bt.executive.tree_fields import NAME_PATTERN
-from defras_bt.executive.tree_file import SUBTREE, SubtreeOptions, TreeHeader
+from defras_bt.executive.tree_header import SUBTREE, SubtreeOptions, TreeHeader
 from defras_bt.executive.tree_kinds import KINDS
 from defras_sim.resources import resource
 
@@ -27,6 +28,19 @@ SCHEMA_LINE = "# yaml-language-server: $schema=schema.json"
 Schema = dict[str, Any]
 
 _NODE_REF = {"$ref": "#/$defs/node"}
+_WIRE: Schema = {
+    "anyOf": [
+        {"type": "string", "pattern": NAME_PATTERN, "description": "A key."},
+        {"type": "boolean"},
+        {"type": "number"},
+        {
+            "type": "object",
+            "required": ["value"],
+            "additionalProperties": False,
+            "properties": {"value": {}},
+        },
+    ],
+}
 _NAME: Schema = {"type": "string", "pattern": NAME_PATTERN, "description": "Part of its path."}
 
 
@@ -48,10 +62,15 @@ def tree_schema(nodes: Mapping[str, type[Node]]) -> Schema:
             body["required"] = [kind.holds, *body.get("required", [])]
         kinds[kind.name] = body
     kinds[SUBTREE] = _body(SUBTREE, SubtreeOptions, "The tree of another file.", definitions)
+    kinds[SUBTREE]["properties"]["ports"] = {"type": "object", "additionalProperties": _WIRE}
     for name, node_class in nodes.items():
         description = f"{inspect.getdoc(node_class)}\n\nRole: {node_class.role}."
         kinds[name] = _body(name, node_class.Parameters, description, definitions)
+        ports = ports_of(node_class)
+        if ports:
+            kinds[name]["properties"]["ports"] = _ports(ports)
     header = TreeHeader.model_json_schema()
+    definitions.update(header.pop("$defs"))
     header["properties"]["tree"] = {**_NODE_REF, "description": "The topmost node."}
     definitions["node"] = {
         "anyOf": [
@@ -71,6 +90,15 @@ def tree_schema(nodes: Mapping[str, type[Node]]) -> Schema:
         "title": "Behaviour tree",
         "$defs": {**definitions, **kinds},
     }
+
+
+def _ports(ports: Mapping[str, Port[Any]]) -> Schema:
+    """Schema of what stands under ``ports`` of a leaf."""
+    said = {
+        name: {**_WIRE, "description": f"{port.direction}, {port.type_name}. {port.description}"}
+        for name, port in ports.items()
+    }
+    return {"type": "object", "additionalProperties": False, "properties": said}
 
 
 def schema_text(nodes: Mapping[str, type[Node]]) -> str:
