@@ -15,6 +15,8 @@ from pydantic import TypeAdapter
 
 from defras_bt.executive.substitution import Substitute, Substitutes
 from defras_bt.executive.tree_file import read_tree
+from defras_bt.faults.faults import KINDS, Faults
+from defras_bt.faults.system import PlannerTimesOut, TwinDiverges
 from defras_bt.planning.plan import Plan
 
 if TYPE_CHECKING:
@@ -23,7 +25,11 @@ if TYPE_CHECKING:
 _PLAN: TypeAdapter[Plan | None] = TypeAdapter(Plan | None)
 
 
-def again_values(operation: Operation) -> Mapping[str, Any]:
+_UNSEEN_FAULTS = (TwinDiverges, PlannerTimesOut)
+"""Injected faults whose effect does not stand in what was sensed: they have to happen again."""
+
+
+def again_values(operation: Operation, faults: Faults) -> Mapping[str, Any]:
     """For :attr:`~defras_bt.recording.record.RunInfo.again`."""
     return {
         "tree": tree_files(operation.tree_file),
@@ -32,6 +38,11 @@ def again_values(operation: Operation) -> Mapping[str, Any]:
         "substitutes": [
             entry.model_dump(mode="json", exclude_unset=True)
             for entry, _ in operation.substitutes.entries
+        ],
+        "faults": [
+            {"fault": fault.kind, **fault.model_dump(mode="json")}
+            for fault in faults.faults
+            if isinstance(fault, _UNSEEN_FAULTS)
         ],
     }
 
@@ -45,6 +56,16 @@ def recorded_substitutes(again: Mapping[str, Any], file: Path) -> Substitutes:
     """Which nodes were substituted; ``file``: where that stands."""
     entries = (Substitute.model_validate(entry) for entry in again["substitutes"])
     return Substitutes(tuple((entry, (file, 1, 1)) for entry in entries))
+
+
+def recorded_faults(again: Mapping[str, Any]) -> Faults:
+    """Which faults of the program itself were injected."""
+    return Faults(
+        tuple(
+            KINDS[entry["fault"]].model_validate({k: v for k, v in entry.items() if k != "fault"})
+            for entry in again["faults"]
+        )
+    )
 
 
 def tree_files(main: Path) -> Mapping[str, Any]:

@@ -17,7 +17,7 @@ from defras_bt.executive.deadline import Deadline
 from defras_bt.executive.executive import Executive
 from defras_bt.executive.perception import Perception
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
-from defras_bt.faults.faults import NO_FAULTS, FaultInjection
+from defras_bt.faults.faults import NO_FAULTS, FaultInjection, Faults
 from defras_bt.learning.buffer import KeyframeBuffer
 from defras_bt.learning.inverse import InverseEstimator
 from defras_bt.monitoring.warning import WarningMonitor
@@ -162,7 +162,7 @@ def operate_in(
         breaker = injected.breaker()
         if breaker is not None:
             executive.watch(breaker)
-        recorder.start(_info(operation, executive, believed))
+        recorder.start(_info(operation, executive, believed, injected.faults))
         try:
             executive.run()
         finally:
@@ -211,7 +211,7 @@ def _before_first_tick(world: World, force_threshold_n: float) -> TickInputs:
     )
 
 
-def _info(operation: Operation, executive: Executive, believed: Scene) -> RunInfo:
+def _info(operation: Operation, executive: Executive, believed: Scene, faults: Faults) -> RunInfo:
     return RunInfo(
         scene=believed,
         scene_file=operation.scene_file,
@@ -226,5 +226,5 @@ def _info(operation: Operation, executive: Executive, believed: Scene) -> RunInf
         versions=versions(),
         believed=believed.attached,
         substituted=executive.substituted,
-        again=again_values(operation),
+        again=again_values(operation, faults),
     )

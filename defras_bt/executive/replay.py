@@ -11,10 +11,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from defras_bt.executive.again import recorded_plan, recorded_substitutes, unpack_tree
+from defras_bt.executive.again import (
+    recorded_faults,
+    recorded_plan,
+    recorded_substitutes,
+    unpack_tree,
+)
 from defras_bt.executive.executive import ExecutiveFailed
 from defras_bt.executive.operation import Operation, operate_in, random_generators
 from defras_bt.executive.reasons import Code
+from defras_bt.faults.faults import FaultInjection
 from defras_bt.planning.plan import Plan
 from defras_bt.recording.decision_reader import read_decisions
 from defras_bt.recording.inputs import TickInput
@@ -200,6 +206,7 @@ def _replay(
             (comparison, *recorders),
             approve=approve,
             operator_stop=lambda: world.now.operator_stop,
+            faults=FaultInjection(recorded_faults(again), scene, seed),
         )
     except ExecutiveFailed as error:
         if not isinstance(error.__cause__, EndOfRecording):

@@ -101,18 +101,18 @@ class FaultInjection:
     """
 
     def __init__(self, faults: Faults, scene: Scene, seed: int) -> None:
-        self._faults = faults
+        self.faults = faults
         self._scene = scene
         self._rng = np.random.default_rng([faults.seed, seed])
         self._world: World | None = None
 
     def world(self, world: World) -> World:
         """``world`` seen and commanded through the faults."""
-        if self._faults.faults:
+        if self.faults.faults:
             injectors = [
                 fault.injector(self._scene, rng)
                 for fault, rng in zip(
-                    self._faults.faults, self._rng.spawn(len(self._faults.faults)), strict=True
+                    self.faults.faults, self._rng.spawn(len(self.faults.faults)), strict=True
                 )
             ]
             world = FaultyWorld(world, injectors)
@@ -120,16 +120,16 @@ class FaultInjection:
         return world
 
     def twin(self, scene: Scene) -> Twin:
-        diverges = self._faults.of(TwinDiverges)
+        diverges = self.faults.of(TwinDiverges)
         return FaultyTwin(scene, diverges) if diverges else Twin(scene)
 
     def planner(self, scene: Scene) -> Planner:
-        times_out = self._faults.of(PlannerTimesOut)
+        times_out = self.faults.of(PlannerTimesOut)
         return FaultyPlanner(scene, times_out, self._now_s) if times_out else Planner(scene)
 
     def breaker(self) -> NodeBreaker | None:
         """What breaks nodes of the tree as it is ticked; None if nothing does."""
-        faults = [fault for fault in self._faults.faults if isinstance(fault, NodeFault)]
+        faults = [fault for fault in self.faults.faults if isinstance(fault, NodeFault)]
         if not faults or not isinstance(self._world, FaultyWorld):
             return None
         return NodeBreaker(faults, self._now_s, self._world.mark)
@@ -141,7 +141,7 @@ class FaultInjection:
         name = type(recorder).__name__
         full = [
             fault
-            for fault in self._faults.faults
+            for fault in self.faults.faults
             if isinstance(fault, DiskFull)
             and (
                 _RECORDERS.get(fault.recorder) == name

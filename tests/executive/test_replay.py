@@ -14,7 +14,11 @@ from defras_bt.executive.operation import Operation, operate, operate_in, random
 from defras_bt.executive.replay import replay
 from defras_bt.executive.scripted import Script
 from defras_bt.executive.substitution import Substitute, Substitutes
+from defras_bt.faults.faults import FaultInjection, Faults
+from defras_bt.faults.readings import Frozen
+from defras_bt.faults.system import PlannerTimesOut, TwinDiverges
 from defras_bt.recording.bag import BagRecorder
+from defras_bt.recording.decision_reader import read_decisions
 from defras_bt.recording.decisions import DECISIONS_FILE, DecisionRecorder
 from defras_bt.recording.inputs_reader import BAG, NoInputs, read_inputs
 from defras_bt.recording.record import Recorder
@@ -96,6 +100,28 @@ class TestUnchanged:
         )
         assert summary.values["outcome"] == "human"
         assert replay(tmp_path).difference is None
+
+    @pytest.mark.parametrize(
+        ("faults", "codes"),
+        [
+            ([PlannerTimesOut()], {"planner_timed_out"}),
+            (
+                [
+                    Frozen(reading="cloud", start_s=0.5, duration_s=0.7),
+                    TwinDiverges(start_s=2.0, duration_s=0.3),
+                ],
+                {"stale", "force_unknown"},
+            ),
+        ],
+    )
+    def test_faults_of_sensors_and_of_the_program_are_part_of_it(self, tmp_path, faults, codes):
+        run = operation(resource("trees/fras.yaml"), max_time_s=3.0)
+        injected = FaultInjection(Faults(tuple(faults)), run.scene, run.seed)
+        operate(run, recorders(tmp_path), faults=injected)
+        moments = list(read_decisions(tmp_path).moments())
+        assert codes <= {word.code for moment in moments for word in moment.nodes.values()}
+        result = replay(tmp_path)
+        assert (result.ticks, result.difference) == (len(moments), None)
 
     def test_a_killed_run_is_replayed_as_far_as_it_was_recorded(self, run):
         file = run / BAG
