@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Mapping
 from io import StringIO
 from pathlib import Path
@@ -18,7 +19,13 @@ SCHEMA_LINE = "# yaml-language-server: $schema=scene.schema.json\n"
 
 
 def write_scene(scene: Scene, file: Path) -> None:
-    """Write everything in which ``scene`` differs from the defaults."""
+    """Write everything in which ``scene`` differs from the defaults.
+
+    The file of its anatomy, if it has one, is put beside it.
+    """
+    anatomy = scene.tissue.anatomy
+    if anatomy is not None and anatomy.file.parent.resolve() != file.parent.resolve():
+        shutil.copyfile(anatomy.file, file.parent / anatomy.file.name)
     _write(scene.model_dump(mode="json", exclude_defaults=True), file)
 
 

@@ -25,6 +25,7 @@ from pydantic_core import CoreSchema, core_schema
 from defras_sim.anatomy.curved_face import CurvedFace
 from defras_sim.anatomy.topology import Topology, length_m
 from defras_sim.geometry import Floats
+from defras_sim.surface import Surface
 
 MeshName = Literal["twin", "actual"]
 MESHES: tuple[MeshName, ...] = ("twin", "actual")
@@ -75,6 +76,13 @@ class Anatomy:
     def taking(self, mesh: MeshName) -> Anatomy:
         """The same anatomy with another mesh."""
         return replace(self, mesh=mesh)
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The resting tissue's surface."""
+        upper = np.zeros(len(self.vertices_m), dtype=bool)
+        upper[self.triangles[self.side == 1]] = True
+        return Surface(self.vertices_m, self.triangles, upper, self.vertices_m[:, :2].copy())
 
     @property
     def volume_mesh(self) -> VolumeMesh:

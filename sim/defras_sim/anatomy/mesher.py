@@ -32,8 +32,14 @@ def meshed(
     least, most = unknowns
     edge_m, too_long, too_short = _first_guess_m(tissue, (least + most) / 2), np.inf, 0.0
     best: VolumeMesh | None = None
+    fault: RefusedSurface | None = None
     for _ in range(_MOST_TRIES):
-        mesh = _with_edges(tissue, edge_m)
+        try:
+            mesh = _with_edges(tissue, edge_m)
+        except RefusedSurface as error:  # shorter edges follow the surface better
+            fault, too_long = error, min(too_long, edge_m)
+            edge_m = _next_m(0.8 * edge_m, too_short, too_long)
+            continue
         count = unknowns_of(mesh)
         if tell is not None:
             tell(f"edges of {1e3 * edge_m:.1f} mm give {count} unknowns")
@@ -46,6 +52,8 @@ def meshed(
             if count >= least:
                 break
         edge_m = _next_m(edge_m * float(np.sqrt(2 * count / (least + most))), too_short, too_long)
+    if best is None and fault is not None:
+        raise fault
     if best is None or unknowns_of(best) < _FEWEST_UNKNOWNS:
         raise RefusedSurface(
             f"no mesh of {least} to {most} unknowns, which is what can be solved in time, follows "

@@ -43,12 +43,9 @@ def surface_map(mesh: Mesh, tissue: Tissue) -> SurfaceMap:
 
 
 def _map(mesh: Mesh, anatomy: Anatomy) -> SurfaceMap:
-    upper = np.zeros(len(anatomy.vertices_m), dtype=bool)
-    upper[anatomy.triangles[anatomy.side == 1]] = True
-    vertices_m = anatomy.vertices_m
-    return SurfaceMap(
-        mesh.interpolation(vertices_m), anatomy.triangles, upper, vertices_m[:, :2].copy()
-    )
+    rest = anatomy.surface
+    from_nodes = mesh.interpolation(rest.vertices_m)
+    return SurfaceMap(from_nodes, rest.triangles, rest.upper, rest.rest_xy_m)
 
 
 def _slab_map(mesh: Mesh, tissue: Tissue) -> SurfaceMap:
