@@ -10,6 +10,7 @@ from defras_bt.cli.errors import ExitCode
 from defras_bt.cli.files import find
 from defras_bt.executive.proof.prover import prove
 from defras_bt.executive.proof.report import proof_text
+from defras_bt.executive.tree_diff import tree_diff
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.executive.tree_show import outline_of_spec, show_mermaid, show_text
 
@@ -58,3 +59,24 @@ def prove_tree(
     typer.echo(f"{file}: {spec.name} {verdict} from every state, for {plans}")
     if not proof.holds:
         raise typer.Exit(ExitCode.INVALID)
+
+
+@app.command("diff")
+def diff(
+    old: Annotated[str, typer.Argument(help="Tree as it was: a file, or a shipped name.")],
+    new: Annotated[str, typer.Argument(help="Tree as it is.")],
+) -> None:
+    """Say what changed between two trees, by meaning. Example: defras tree diff fras mine.yaml
+
+    Lost guards come first. Comments, layout, and whether a part stands in a file of its own mean
+    nothing.
+    """
+    before, after = (read_tree(find(name, "trees"), must_be_guarded=False) for name in (old, new))
+    changes = tree_diff(before, after)
+    for change in changes:
+        typer.echo(change)
+    lost = sum(change.kind == "guard lost" for change in changes)
+    if lost:
+        typer.echo(f"{lost} guard(s) lost: see `defras tree prove {new}`")
+    if not changes:
+        typer.echo(f"{old} and {new} mean the same")
