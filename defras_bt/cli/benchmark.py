@@ -6,17 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import Progress
-from rich.table import Table
 
 from defras_bt.benchmark.files import write_benchmark
 from defras_bt.benchmark.planner import planning_times
-from defras_bt.benchmark.table1 import BELIEVED, RELATIONS, TREES, Row, table1
-from defras_bt.benchmark.table1_summary import by_case, by_tree
-from defras_bt.cli.errors import UserError
+from defras_bt.cli.benchmark_retraction import table1, table2
 from defras_bt.cli.files import find_scene, folder_for
-from defras_bt.executive.operation import WORLDS
 
 app = typer.Typer(help="Measure, and leave a JSON, a CSV and a page.", no_args_is_help=True)
 
@@ -26,48 +20,8 @@ def benchmarks() -> None:
     """Measure, and leave NAME.json, NAME.csv and NAME.html."""
 
 
-@app.command("table1")
-def run_table1(
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/benchmark"),
-    world: Annotated[str, typer.Option(help="model or bullet.")] = "model",
-    trees: Annotated[str, typer.Option(help="Trees, separated by commas.")] = ",".join(TREES),
-    seed: Annotated[int, typer.Option(min=0)] = 0,
-    jobs: Annotated[int, typer.Option(min=1, help="Runs side by side.")] = 2,
-) -> None:
-    """The paper's 16 simulated cases: fewer and more attachments than believed, each tree.
-
-    Example: defras benchmark table1 --world model --out out/benchmark
-    """
-    if world not in WORLDS:
-        raise UserError(f"--world {world}: valid are {', '.join(WORLDS)}")
-    names = trees.split(",")
-    unknown = [name for name in names if name not in TREES]
-    if unknown:
-        raise UserError(f"--trees {','.join(unknown)}: valid are {', '.join(TREES)}")
-    rows: list[Row] = []
-    with Progress(console=Console(stderr=True)) as progress:
-        task = progress.add_task("runs", total=len(BELIEVED) * len(RELATIONS) * len(names))
-        for row in table1(world, names, seed, jobs):
-            rows.append(row)
-            seen = row.values.get("roi_visibility") or 0.0
-            progress.console.print(
-                f"{row.scene} {row.relation}, {row.tree}: {row.values['outcome']}, "
-                f"{seen:.0%} visible"
-            )
-            progress.advance(task)
-    summary, cases = by_tree(rows), by_case(rows)
-    write_benchmark(
-        out,
-        "table1",
-        f"Fewer and more attachments than believed ({world} world)",
-        {"By tree (median / mean / worst)": summary, "By case": cases},
-        [f"World: {world}. Seed: {seed}. F max true is the world's own force."],
-    )
-    table = Table(*summary[0])
-    for line in summary:
-        table.add_row(*map(str, line.values()))
-    Console().print(table)
-    typer.echo(f"Written to {out}: table1.json, table1.csv, table1.html")
+app.command("table1")(table1)
+app.command("table2")(table2)
 
 
 @app.command("planner")

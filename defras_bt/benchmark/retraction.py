@@ -1,0 +1,164 @@
+"""Retractions of many patients with every tree, and by an oracle that knows the attachments."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from joblib import Parallel, delayed
+
+from defras_bt.benchmark.cases import Case, configurations, shipped
+from defras_bt.benchmark.force_error import ForceError
+from defras_bt.executive.executive import ExecutiveFailed
+from defras_bt.executive.operation import Operation, operate
+from defras_bt.executive.tree_file import read_tree
+from defras_bt.planning.engine import Engine
+from defras_bt.planning.journal import Journal
+from defras_bt.planning.preoperative import (
+    PreoperativeResult,
+    preoperative_plans,
+    result_of,
+)
+from defras_bt.planning.preparation import needs_plan
+from defras_bt.planning.rehearsals import Progress, rehearse_all
+from defras_bt.planning.scene_hash import scene_hash
+from defras_sim.resources import resource
+from defras_sim.scene import Scene
+from defras_sim.scene_generator import NoScene
+
+TREES = ("defras", "defras_paper", "fras")
+ORACLE = "oracle"
+"""trees/defras.yaml with the actual attachments as its belief: what could be had at best."""
+
+RUNS = (*TREES, ORACLE)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One run: the case, the tree or the oracle, and the content of run.json with more numbers.
+
+    A run that broke is a row with outcome "error"; a seed without a scene is one with "no scene".
+    """
+
+    case: str
+    relation: str
+    run: str
+    values: Mapping[str, Any]
+
+    @property
+    def key(self) -> str:
+        return f"{self.case} {self.relation} {self.run}"
+
+
+@dataclass(frozen=True)
+class Preparations:
+    """Plans by scene content, and F_m over the 17 configurations."""
+
+    plans: Mapping[str, PreoperativeResult]
+    force_median_n: float
+
+
+def prepared(
+    world: str,
+    *,
+    jobs: int = -1,
+    journal: Journal | None = None,
+    progress: Progress | None = None,
+) -> Preparations:
+    """Rehearse all grasp points of the 17 configurations: epsilon, and a plan for each."""
+    scenes = [_in_world(shipped(name), world) for name in configurations()]
+    results = preoperative_plans(
+        scenes, engine=Engine(jobs=jobs), journal=journal, progress=progress
+    )
+    return Preparations({r.scene_hash: r for r in results}, results[0].force_median_n)
+
+
+def run_cases(
+    cases: Sequence[Case],
+    runs: Sequence[str],
+    world: str,
+    preparations: Preparations,
+    *,
+    seed: int = 0,
+    jobs: int = 2,
+    done: frozenset[str] = frozenset(),
+) -> Iterator[Row]:
+    """Run every case with every one of ``runs``, except those in ``done`` (see :attr:`Row.key`)."""
+    missing = [
+        (case, [run for run in runs if f"{case.name} {case.relation} {run}" not in done])
+        for case in cases
+    ]
+    work = (
+        delayed(_rows_of)(case, tuple(wanted), world, preparations, seed)
+        for case, wanted in missing
+        if wanted
+    )
+    for rows in Parallel(n_jobs=jobs, return_as="generator_unordered")(work):
+        yield from rows
+
+
+def _rows_of(
+    case: Case, runs: tuple[str, ...], world: str, preparations: Preparations, seed: int
+) -> list[Row]:
+    try:
+        believed, actual = case.scenes()
+    except NoScene as error:
+        nothing = {"outcome": "no scene", "error": str(error)}
+        return [Row(case.name, case.relation, run, nothing) for run in runs]
+    # Every case meets its own noise; the same for all trees.
+    digest = hashlib.sha256(f"{seed} {case.name} {case.relation}".encode()).digest()
+    own_seed = seed if case.seed is None else int.from_bytes(digest[:4], "little")
+    rows = []
+    for run in runs:
+        known = actual if run == ORACLE else believed
+        values = _run(case, known, actual, run, world, preparations, own_seed)
+        rows.append(Row(case.name, case.relation, run, values))
+    return rows
+
+
+def _run(
+    case: Case,
+    believed: Scene,
+    actual: Scene,
+    run: str,
+    world: str,
+    preparations: Preparations,
+    seed: int,
+) -> dict[str, Any]:
+    tree_file = resource(f"trees/{TREES[0] if run == ORACLE else run}.yaml")
+    threshold_n = believed.thresholds.force_n or 2 * preparations.force_median_n
+    plan = None
+    if needs_plan(read_tree(tree_file)):
+        plan = _plan(_in_world(believed, world), preparations).plan
+    operation = Operation(
+        scene=believed,
+        actual=actual,
+        scene_file=f"{believed.name}.yaml",
+        actual_file=f"{actual.name}.yaml",
+        world=world,
+        tree_file=tree_file,
+        seed=seed,
+        force_threshold_n=threshold_n,
+        preoperative=plan,
+    )
+    force = ForceError()
+    try:
+        values = dict(operate(operation, [force]).values)
+    except ExecutiveFailed as error:
+        values = {**force.summary, "outcome": "error", "error": str(error)}
+    return {**values, **force.values()}
+
+
+def _plan(scene: Scene, preparations: Preparations) -> PreoperativeResult:
+    """The plan made before the operation; rehearsed now, if nobody did yet."""
+    known = preparations.plans.get(scene_hash(scene))
+    if known is not None:
+        return known
+    executions = rehearse_all([scene], engine=Engine(jobs=1))[0]
+    return result_of(scene, executions, preparations.force_median_n)
+
+
+def _in_world(scene: Scene, world: str) -> Scene:
+    return scene.for_bullet() if world == "bullet" else scene

@@ -1,0 +1,145 @@
+"""``defras benchmark table1`` and ``table2``: whole retractions, every tree on every patient."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from defras_bt.benchmark.cases import Case, generated_cases, table1_cases, table2_cases
+from defras_bt.benchmark.files import write_benchmark
+from defras_bt.benchmark.retraction import RUNS, Row, prepared, run_cases
+from defras_bt.benchmark.retraction_summary import by_case, spread, success
+from defras_bt.benchmark.row_store import OtherBenchmark, RowStore
+from defras_bt.cli.errors import UserError
+from defras_bt.cli.files import folder_for
+from defras_bt.executive.operation import WORLDS
+from defras_bt.planning.journal import InvalidJournal, Journal
+
+FIRST_UNSEEN_SEED = 10_000
+"""Generated scenes of lower seeds were looked at while the trees were made."""
+
+ALL_RUNS = ",".join(RUNS)
+
+Out = Annotated[Path, typer.Option(help="Folder for the results.")]
+World = Annotated[str, typer.Option(help="model or bullet.")]
+Runs = Annotated[str, typer.Option(help="Trees and the oracle, separated by commas.")]
+Seed = Annotated[int, typer.Option(min=0, help="Of the worlds' noise.")]
+Jobs = Annotated[int, typer.Option(min=1, help="Runs side by side.")]
+Resume = Annotated[bool, typer.Option(help="Go on with the rows already in the folder.")]
+
+
+def table1(
+    out: Out = Path("out/benchmark"),
+    world: World = "model",
+    trees: Runs = ALL_RUNS,
+    seed: Seed = 0,
+    seeds: Annotated[
+        int, typer.Option(min=0, help="Instead: this many generated patients of each kind.")
+    ] = 0,
+    first_seed: Annotated[int, typer.Option(min=0, help="Of the generated patients.")] = (
+        FIRST_UNSEEN_SEED
+    ),
+    jobs: Jobs = 2,
+    resume: Resume = False,
+) -> None:
+    """Fewer and more attachments than believed: the paper's 16 cases, or generated patients.
+
+    Example: defras benchmark table1 --world model --out out/benchmark
+
+    Example: defras benchmark table1 --seeds 100 --trees defras,oracle --out out/seeds
+    """
+    cases = generated_cases(first_seed, seeds) if seeds else table1_cases()
+    title = f"Fewer and more attachments than believed ({world} world)"
+    _measure("table1", title, cases, out, world, trees, seed, jobs, resume)
+
+
+def table2(
+    out: Out = Path("out/benchmark"),
+    world: World = "model",
+    trees: Runs = ALL_RUNS,
+    seed: Seed = 0,
+    jobs: Jobs = 2,
+    resume: Resume = False,
+) -> None:
+    """The set-ups A, B and C with fewer, more and as many attachments believed.
+
+    Example: defras benchmark table2 --world model --out out/benchmark
+    """
+    title = f"Fewer, more and as many attachments believed ({world} world)"
+    _measure("table2", title, table2_cases(), out, world, trees, seed, jobs, resume)
+
+
+def _measure(
+    name: str,
+    title: str,
+    cases: Sequence[Case],
+    out: Path,
+    world: str,
+    trees: str,
+    seed: int,
+    jobs: int,
+    resume: bool,
+) -> None:
+    if world not in WORLDS:
+        raise UserError(f"--world {world}: valid are {', '.join(WORLDS)}")
+    runs = trees.split(",")
+    if unknown := [run for run in runs if run not in RUNS]:
+        raise UserError(f"--trees {','.join(unknown)}: valid are {', '.join(RUNS)}")
+    folder_for(out)  # before the runs, not after
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    question = f"{name}, {world} world, seed {seed}"
+    try:
+        rows = RowStore(out / f"{name}.rows.jsonl", question, resume=resume)
+        journal = Journal(out / "rehearsals.journal")
+    except (OtherBenchmark, InvalidJournal) as error:
+        raise UserError(str(error)) from error
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    wanted = {f"{case.name} {case.relation} {run}" for case in cases for run in runs}
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("rehearsing the 17 configurations", total=None)
+        preparations = prepared(
+            world,
+            jobs=jobs,
+            journal=journal,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+        bar.update(task, description="runs", total=len(wanted), completed=len(rows.done & wanted))
+        console.print(f"epsilon: {2 * preparations.force_median_n:.2f} N", markup=False)
+        for row in run_cases(
+            cases, runs, world, preparations, seed=seed, jobs=jobs, done=rows.done
+        ):
+            rows.add(row)
+            bar.advance(task)
+            console.print(_told(row), markup=False)
+    asked = [row for row in rows.rows if row.key in wanted]
+    notes = [
+        f"World: {world}. Seed: {seed}. Force threshold: {2 * preparations.force_median_n:.3f} N, "
+        "twice the median largest force over all rehearsals of the 17 configurations.",
+        "F max true is the world's own force, which the executive never sees. The oracle runs the "
+        "tree defras with the actual attachments as its belief.",
+    ]
+    summary = success(asked)
+    tables = {"Goal reached": summary, "Spread": spread(asked), "By case": by_case(asked)}
+    write_benchmark(out, name, title, tables, notes)
+    rows.discard()
+    shown = Table(*summary[0])
+    for line in summary:
+        shown.add_row(*map(str, line.values()))
+    Console().print(shown)
+    typer.echo(f"Written to {out}: {name}.json, {name}.csv, {name}.html")
+
+
+def _told(row: Row) -> str:
+    seen = row.values.get("roi_visibility") or 0.0
+    return f"{row.case} {row.relation}, {row.run}: {row.values['outcome']}, {seen:.0%} visible"
