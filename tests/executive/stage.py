@@ -12,10 +12,10 @@ from defras_bt.executive.deadline import Deadline
 from defras_bt.executive.executive import Executive
 from defras_bt.executive.perception import Perception
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
+from defras_bt.executive.testing import EPSILON_N, NodeBench
 from defras_bt.recording.composite import CompositeRecorder
 from defras_bt.recording.record import Recorder, RunInfo, RunSummary, TickRecord
 from defras_sim.resources import resource
-from tests.nodes.bench import EPSILON_N, Bench
 
 FORCE_TOO_HIGH_N = 2 * EPSILON_N
 
@@ -48,14 +48,14 @@ class Stage:
     def __init__(
         self,
         tree: str | Path,
-        bench: Bench | None = None,
+        bench: NodeBench | None = None,
         *,
         max_time_s: float = 120.0,
         beside: Sequence[Recorder] = (),
         deadline: Deadline = nullcontext,
         substitutes: Substitutes = NOTHING_SUBSTITUTED,
     ) -> None:
-        self.bench = bench if bench is not None else Bench()
+        self.bench = bench if bench is not None else NodeBench()
         self.operator_stop: str | None = None
         self.notes = Notes()
         self.recorder = CompositeRecorder([self.notes, *beside])

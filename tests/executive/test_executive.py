@@ -10,13 +10,12 @@ import pytest
 from py_trees.common import Status
 
 from defras_bt.executive.executive import ExecutiveFailed
+from defras_bt.executive.testing import EPSILON_N, NodeBench, plan_of
 from defras_bt.recording.record import RunInfo
 from defras_bt.recording.summary import SummaryRecorder, read_run_json
 from defras_bt.recording.versions import versions
 from defras_sim.worlds.protocol import HOLD, Command
 from tests.executive.stage import Stage, leaves, moving, still
-from tests.nodes.bench import EPSILON_N, Bench
-from tests.nodes.bench_services import plan_of
 
 
 def run(stage: Stage) -> ExecutiveFailed:
@@ -28,7 +27,7 @@ def run(stage: Stage) -> ExecutiveFailed:
 
 def at_pull(**options: object) -> Stage:
     """The tissue is held and on its way up."""
-    stage = Stage("fras", Bench(**options))
+    stage = Stage("fras", NodeBench(**options))
     stage.until_doing("pull")
     return stage
 
@@ -284,7 +283,7 @@ class TestTwoExecutives:
 
         def scenario() -> tuple[Stage, Stage]:
             plan = plan_of((3, 4), ("reach", "open", "grasp", "pull", "fold"))
-            return Stage("defras", Bench(preoperative=plan)), Stage("defras_paper")
+            return Stage("defras", NodeBench(preoperative=plan)), Stage("defras_paper")
 
         alone = scenario()
         for stage in alone:
@@ -315,7 +314,7 @@ def test_the_operator_is_shown_each_plan_before_anything_moves():
         shown.append((plan, list(stage.bench.world.sent)))
         return True
 
-    stage = Stage("fras", Bench(approve=approve))
+    stage = Stage("fras", NodeBench(approve=approve))
     stage.until_doing("reach")
     ((plan, sent),) = shown
     assert plan is stage.board.plan

@@ -19,6 +19,7 @@ from defras_bt.executive.gate import (
     GateVerdict,
     Proposal,
 )
+from defras_bt.executive.testing import bench_scene, flat_cloud_m, flat_state
 from defras_bt.monitoring.reading import MonitorReading
 from defras_sim.arm.closed_form import joints_of
 from defras_sim.arm.dh import JOINT_SPEED
@@ -35,8 +36,6 @@ from defras_sim.worlds.protocol import (
     Observation,
     PointCloud,
 )
-from tests.nodes.bench_services import flat_state
-from tests.nodes.bench_world import bench_scene, flat_cloud_m
 
 SCENE = bench_scene()
 GATE = CommandGate(SCENE, "local")

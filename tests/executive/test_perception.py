@@ -9,10 +9,9 @@ import pytest
 
 from defras_bt.executive.blackboard import LearningAttempt
 from defras_bt.executive.perception import Perception
+from defras_bt.executive.testing import EPSILON_N, MU_M, NodeBench
 from defras_sim.geometry import Pose
 from defras_sim.worlds.protocol import JAW_CLOSED_RAD, JAW_OPEN_RAD, ArmCommand, Command
-from tests.nodes.bench import EPSILON_N, Bench
-from tests.nodes.bench_services import MU_M
 
 NAN = float("nan")
 TICK_S = 0.05
@@ -22,7 +21,7 @@ class Senses:
     """A bench with perception alone: no tree, the test moves the tools."""
 
     def __init__(self) -> None:
-        self.bench = Bench()
+        self.bench = NodeBench()
         self.operator_stop: str | None = None
         bench = self.bench
         self.perception = Perception(

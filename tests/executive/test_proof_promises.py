@@ -10,10 +10,10 @@ from py_trees.common import Status
 
 from defras_bt.executive.dangers import LONGEST_PATIENCE_S, WORLD
 from defras_bt.executive.registry import builtin_nodes
+from defras_bt.executive.testing import EPSILON_N, NodeBench
 from defras_sim.worlds.protocol import HOLD
-from tests.nodes.bench import EPSILON_N, Bench
 
-Situation = Callable[[Bench], None]
+Situation = Callable[[NodeBench], None]
 
 
 def says(**inputs: object) -> Situation:
@@ -21,7 +21,7 @@ def says(**inputs: object) -> Situation:
 
 
 def force_for(over_s: float, force_n: float = 2 * EPSILON_N) -> Situation:
-    def put(bench: Bench) -> None:
+    def put(bench: NodeBench) -> None:
         bench.says.update(force_n=force_n, force_over_s=over_s)
         bench.board.force_over_s = over_s
 
@@ -85,7 +85,7 @@ def test_promises_are_kept(name, variable):
     for value in WORLD[variable]:
         for situation in SITUATIONS[variable, value]:
             for parameters in PARAMETERS.get(name, [{}]):
-                bench = Bench()
+                bench = NodeBench()
                 situation(bench)
                 node = bench.node(node_class, **parameters)
                 promised = node_class.promise(node.parameters, variable, value)
@@ -108,7 +108,7 @@ def test_leaves_answer_and_command_as_the_proof_says(variable, value, index, hel
         if node_class.role == "motion":
             continue
         for parameters in PARAMETERS.get(name, [{}]):
-            bench = Bench()
+            bench = NodeBench()
             if held:
                 bench.hold()
             SITUATIONS[variable, value][index](bench)
@@ -118,7 +118,7 @@ def test_leaves_answer_and_command_as_the_proof_says(variable, value, index, hel
 
 
 def test_those_who_may_command_without_moving_do_not_move():
-    bench = Bench()
+    bench = NodeBench()
     bench.hold()
     before_m = bench.tip_m().copy()
     (node_class,) = (leaf for leaf in builtin_nodes().values() if leaf.opens_jaws)

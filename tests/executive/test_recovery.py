@@ -5,10 +5,10 @@ from py_trees.common import Status
 
 from defras_bt.executive.reasons import Code, Remedy
 from defras_bt.executive.recovery import RecoveryLeaf
+from defras_bt.executive.testing import NodeBench
 from defras_bt.learning.nodes import LearnAttachments
 from defras_bt.planning.nodes import Replan
 from defras_bt.recording.record import Cause
-from tests.nodes.bench import Bench
 
 
 class Mend(RecoveryLeaf):
@@ -25,7 +25,7 @@ class Mend(RecoveryLeaf):
 
 @pytest.fixture
 def bench():
-    return Bench()
+    return NodeBench()
 
 
 def test_it_is_not_tried_against_what_it_cannot_mend(bench):

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from defras_bt.executive.reasons import Code, Remedy, helps
 from defras_bt.executive.scripted import Script, ScriptedLeaf, ScriptStep
-from tests.nodes.bench import Bench
+from defras_bt.executive.testing import NodeBench
 
 
 def leaf(script: Script, context: object = None) -> ScriptedLeaf:
@@ -64,7 +64,7 @@ def test_a_code_of_the_project_keeps_its_remedies():
 
 
 def test_the_blackboard_stays_as_it_is():
-    bench = Bench()
+    bench = NodeBench()
     board = bench.board
     before = {field.name: repr(getattr(board, field.name)) for field in fields(board)}
     for status in ("RUNNING", "SUCCESS", "FAILURE"):

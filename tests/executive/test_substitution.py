@@ -12,12 +12,11 @@ from defras_bt.executive.loader import build_tree
 from defras_bt.executive.node import NoParameters
 from defras_bt.executive.scripted import ScriptedLeaf
 from defras_bt.executive.substitution import Substitutes, read_substitutes, substitutes_schema
+from defras_bt.executive.testing import NodeBench, plan_of
 from defras_bt.executive.tree_file import read_tree
 from defras_sim.resources import resource
 from defras_sim.yaml_source import InvalidFile
 from tests.executive.stage import Stage, doing, jaws, still
-from tests.nodes.bench import Bench
-from tests.nodes.bench_services import plan_of
 
 TREE = """
 reactive:
@@ -121,7 +120,7 @@ class TestTrees:
 
 class TestPlans:
     def test_actions_of_every_coming_plan_are_replaced(self, substitutes):
-        bench = Bench()
+        bench = NodeBench()
         tree = read_tree(resource("trees/fras.yaml"))
         told = substitutes("  - {path: '**/act/*_pull_*', status: SUCCESS, after_s: 1}\n")
         (pattern,) = told.paths(tree)

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import pytest
 
+from defras_bt.executive.testing import NodeBench, bench_scene, plan_of
 from defras_bt.planning.plan import Plan
 from defras_sim.worlds.protocol import HOLD, JAW_OPEN_RAD
 from tests.executive.stage import FORCE_TOO_HIGH_N, Stage, doing, jaws, leaves, moving, still, told
-from tests.nodes.bench import Bench
-from tests.nodes.bench_services import plan_of
-from tests.nodes.bench_world import bench_scene
 
 NAN = float("nan")
 MONITORED = ("defras", "defras_paper")
@@ -28,7 +26,7 @@ def on_stage(tree: str, **options: object) -> Stage:
     plain = bench_scene()
     short = {"reach_speed_m_s": 0.1, "pull_height_m": 0.02, "fold_distance_m": 0.03}
     scene = plain.model_copy(update={"motion": plain.motion.model_copy(update=short)})
-    stage = Stage(tree, Bench(scene=scene, **options))
+    stage = Stage(tree, NodeBench(scene=scene, **options))
     for point in stage.bench.planner.points:
         stage.bench.rehearse.shows[point, ("pull", "move", "fold")] = (1.0, 0.1)
     return stage

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from defras_bt.executive.testing import BenchWorld, bench_scene
 from defras_bt.faults.fault import Fault
 from defras_bt.faults.world import FaultyWorld
 from defras_sim.worlds.protocol import HOLD, ArmCommand, Command, Observation
-from tests.nodes.bench_world import BenchWorld, bench_scene
 
 UP = Command({"psm1": ArmCommand(np.array([0.0, 0.0, 0.05]))})
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from defras_bt.executive.testing import bench_scene, flat_cloud_m
 from defras_bt.faults.arms import CommandsLost, GraspLost, JawStuck, Jumped, NotFollowing
 from defras_bt.faults.clouds import Displaced, Noisy, Repeated, Sparse, WrongFrame, WrongUnit
 from defras_bt.faults.readings import (
@@ -21,7 +22,6 @@ from defras_sim.camera.pinhole import tissue_from_camera
 from defras_sim.worlds.error import WorldError
 from defras_sim.worlds.protocol import ArmCommand, Command, Observation
 from tests.faults.faulty_bench import UP, faulty, tripped, watch
-from tests.nodes.bench_world import bench_scene, flat_cloud_m
 
 MAX_AGE_S = bench_scene().thresholds.max_age_s
 ONE_SECOND = {"start_s": 1.0, "duration_s": 1.0}

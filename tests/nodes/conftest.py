@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from tests.nodes.bench import Bench
+from defras_bt.executive.testing import NodeBench
 
 
 @pytest.fixture
-def bench() -> Bench:
-    return Bench()
+def bench() -> NodeBench:
+    return NodeBench()

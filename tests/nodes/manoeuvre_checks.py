@@ -8,7 +8,7 @@ from py_trees.common import Status
 
 from defras_bt.acting.arm_action import ARRIVED_M
 from defras_bt.acting.manoeuvre import SETTLE_S, Manoeuvre
-from tests.nodes.bench import Bench
+from defras_bt.executive.testing import NodeBench
 
 
 class ManoeuvreChecks:
@@ -20,14 +20,14 @@ class ManoeuvreChecks:
         raise NotImplementedError
 
     @pytest.fixture
-    def start_m(self, bench: Bench):
+    def start_m(self, bench: NodeBench):
         """Held tissue, 20 mm up."""
         bench.hold((2, 4))
         bench.put("psm1", bench.tip_m() + [0.0, 0.0, 0.02])
         return bench.tip_m().copy()
 
     @pytest.fixture
-    def node(self, bench: Bench):
+    def node(self, bench: NodeBench):
         return bench.node(self.leaf, arm="psm1", point=(2, 4))
 
     def test_it_goes_straight_to_its_end(self, bench, start_m, node):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
+from defras_bt.executive.testing import flat_cloud_m
 from defras_bt.learning.nodes import LearnAttachments
 from defras_sim.worlds.protocol import PointCloud
-from tests.nodes.bench_world import flat_cloud_m
 
 
 @pytest.fixture

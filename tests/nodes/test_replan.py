@@ -4,10 +4,9 @@ import pytest
 from py_trees.common import Status
 from pydantic import ValidationError
 
+from defras_bt.executive.testing import NodeBench, plan_of
 from defras_bt.planning.nodes import Replan
 from defras_sim.worlds.protocol import JAW_OPEN_RAD
-from tests.nodes.bench import Bench
-from tests.nodes.bench_services import plan_of
 
 PULL, FOLD, MOVE = ("pull",), ("pull", "fold"), ("pull", "move")
 ALL = ("pull", "move", "fold")
@@ -73,7 +72,7 @@ class TestAdoption:
         assert bench.board.new_plan is None
 
     def test_the_operator_can_refuse(self):
-        bench = Bench(approve=lambda plan: False)
+        bench = NodeBench(approve=lambda plan: False)
         node = bench.node(Replan)
         assert (bench.tick(node), node.code) == (Status.FAILURE, "plan_refused")
         assert bench.board.new_plan is None

@@ -2,15 +2,14 @@
 
 from py_trees.common import Status
 
+from defras_bt.executive.testing import NodeBench, plan_of
 from defras_bt.planning.nodes import UsePreoperativePlan
-from tests.nodes.bench import Bench
-from tests.nodes.bench_services import plan_of
 
 PLAN = plan_of((2, 4), ("reach", "open", "grasp", "pull", "fold"))
 
 
 def test_it_is_brought_once():
-    bench = Bench(preoperative=PLAN)
+    bench = NodeBench(preoperative=PLAN)
     node = bench.node(UsePreoperativePlan)
     assert (bench.tick(node), node.code) == (Status.SUCCESS, "planned")
     assert bench.board.new_plan is PLAN
@@ -29,7 +28,7 @@ def test_there_may_be_none(bench):
 
 def test_the_operator_can_refuse_it():
     shown = []
-    bench = Bench(preoperative=PLAN, approve=lambda plan: bool(shown.append(plan)))
+    bench = NodeBench(preoperative=PLAN, approve=lambda plan: bool(shown.append(plan)))
     node = bench.node(UsePreoperativePlan)
     assert (bench.tick(node), node.code) == (Status.FAILURE, "plan_refused")
     assert shown == [PLAN]
@@ -39,6 +38,6 @@ def test_the_operator_can_refuse_it():
 
 def test_it_notes_after_which_manoeuvres_the_region_should_be_seen():
     """Or a preoperative plan that exposes nothing would leave its grasp point in use."""
-    bench = Bench(preoperative=PLAN)
+    bench = NodeBench(preoperative=PLAN)
     bench.tick(bench.node(UsePreoperativePlan))
     assert bench.board.plan_exposing == ("pull", "fold")

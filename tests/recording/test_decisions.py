@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from defras_bt.executive.reasons import Code
+from defras_bt.executive.testing import EPSILON_N
 from defras_bt.recording.decision_reader import InvalidDecisions, read_decisions
 from defras_bt.recording.decisions import DECISIONS_FILE, DecisionRecorder
 from defras_bt.recording.moment import moment_of
 from tests.executive.stage import Notes, Stage
-from tests.nodes.bench import EPSILON_N
 from tests.recording.synthetic_run import SyntheticRun
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from defras_bt.executive.reasons import Code
+from defras_bt.executive.testing import EPSILON_N
 from defras_bt.recording.explain import Explanation, explain, spoken
 from defras_bt.recording.moment import moment_of
 from tests.executive.stage import Stage
-from tests.nodes.bench import EPSILON_N
 
 
 @pytest.fixture

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from defras_bt.executive.blackboard import Blackboard, Grip, TickInputs
@@ -14,14 +16,8 @@ from defras_bt.executive.context import Context
 from defras_bt.executive.grips import GripTracker
 from defras_bt.executive.node import Node
 from defras_bt.executive.reasons import ReasonCode
-from defras_bt.learning.buffer import KeyframeBuffer
-from defras_bt.monitoring.reading import MonitorReading
-from defras_bt.planning.plan import GridPoint, Plan
-from defras_bt.recording.record import Cause
-from defras_sim.geometry import Floats, Pose
-from defras_sim.scene import Scene
-from defras_sim.worlds.protocol import ArmCommand
-from tests.nodes.bench_services import (
+from defras_bt.executive.scripted import Script, ScriptedLeaf, StatusName
+from defras_bt.executive.testing.services import (
     MU_M,
     BenchEstimator,
     BenchMonitor,
@@ -30,14 +26,26 @@ from tests.nodes.bench_services import (
     BenchTwin,
     flat_state,
 )
-from tests.nodes.bench_world import BenchWorld, bench_scene
+from defras_bt.executive.testing.world import BenchWorld, bench_scene
+from defras_bt.learning.buffer import KeyframeBuffer
+from defras_bt.monitoring.reading import MonitorReading
+from defras_bt.planning.plan import GridPoint, Plan
+from defras_bt.recording.record import Cause
+from defras_sim.geometry import Floats, Pose
+from defras_sim.scene import Scene
+from defras_sim.worlds.protocol import ArmCommand
 
 EPSILON_N = 0.3
 
 
 @dataclass
-class Bench:
-    """A world, its services, and one blackboard. ``says`` overrides inputs of the next ticks."""
+class NodeBench:
+    """A world, its services, and one blackboard.
+
+    ``says`` overrides fields of :class:`TickInputs` in the next ticks. The services are attributes:
+    ``world``, ``twin``, ``monitor``, ``planner``, ``estimator``, ``keyframes``, ``rehearse``;
+    change them between two ticks. ``board`` and ``context`` are what nodes are given.
+    """
 
     preoperative: Plan | None = None
     approve: Callable[[Plan], bool] = lambda plan: True
@@ -69,9 +77,17 @@ class Bench:
         )
 
     def node(self, node_class: type[Node], **parameters: Any) -> Node:
-        """A leaf as a tree file with these parameters would make it."""
+        """A leaf as a tree file with these parameters would make it.
+
+        Raises:
+            pydantic.ValidationError: a tree file could not say so.
+        """
         options = node_class.Parameters.model_validate(parameters)
         return node_class(node_class.__name__, self.context, options)
+
+    def scripted(self, name: str, *statuses: StatusName) -> ScriptedLeaf:
+        """A leaf that says these statuses, one a tick; the last one stays."""
+        return ScriptedLeaf(name, self.context, Script.of(*statuses))
 
     def warn(self, state: int | None, mu_m: float | None = None) -> None:
         """Both metrics are in ``state`` from now on; None: monitoring says nothing."""
@@ -85,7 +101,7 @@ class Bench:
         """In the next ticks, recoveries find that this has failed."""
         self.failure = Cause(code, message)
 
-    def tick(self, node: Node) -> Status:
+    def tick(self, node: Behaviour) -> Status:
         """Sense, tick ``node``, carry out what it proposes, and let the time of a tick pass."""
         self.grip_tracker.update(self.world.observe())
         self.board.begin_tick(self._inputs())
@@ -95,18 +111,28 @@ class Bench:
         self.world.step()
         return node.status
 
-    def run(self, node: Node, most_s: float = 10.0) -> Status:
-        """Tick ``node`` until it ends."""
+    def ticks(self, node: Behaviour, count: int) -> list[str]:
+        """What ``node`` shows in the next ``count`` ticks."""
+        return [self.tick(node).name for _ in range(count)]
+
+    def run(self, node: Behaviour, most_s: float = 10.0) -> Status:
+        """Tick ``node`` until it ends.
+
+        Raises:
+            AssertionError: it still runs after ``most_s`` of world time.
+        """
         end_s = self.world.time_s + most_s
         while self.world.time_s < end_s:
             if self.tick(node) != Status.RUNNING:
                 return node.status
-        raise AssertionError(f"still {node.code} after {most_s} s: {node.feedback_message}")
+        code = getattr(node, "code", node.status.name)
+        raise AssertionError(f"still {code} after {most_s} s: {node.feedback_message}")
 
     def tip_m(self, arm: str = "psm1") -> Floats:
+        """Where the tip of ``arm`` is (3,), tissue frame."""
         return self.world.tools[arm].tissue_from_tip.position_m
 
-    def put(self, arm: str, tip_m: Sequence[float], jaw_rad: float | None = None) -> None:
+    def put(self, arm: str, tip_m: ArrayLike, jaw_rad: float | None = None) -> None:
         """Place a tip, and its jaw, by hand."""
         tool = self.world.tools[arm]
         tool.tissue_from_tip = Pose(np.asarray(tip_m, float), tool.tissue_from_tip.rotation)
@@ -129,6 +155,7 @@ class Bench:
         return self.world.sent[-1].arms.get(arm, ArmCommand()).linear_m_s
 
     def commanded_jaw_rad(self, arm: str = "psm1") -> float | None:
+        """Angle at which the last tick asked the jaw of ``arm`` to be; None: to stay."""
         return self.world.sent[-1].arms.get(arm, ArmCommand()).jaw_rad
 
     def told(self, kind: str) -> list[str]:

@@ -47,7 +47,7 @@ class BenchWorld:
 
     def __init__(self, scene: Scene) -> None:
         self.tick_s = scene.tick_s
-        self.tools = {
+        self.tools: dict[str, KinematicTool] = {
             arm: KinematicTool.at(np.array(part.home_tip_m)) for arm, part in scene.arms.items()
         }
         self.cloud_m: Floats | None = flat_cloud_m()
