@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from defras_bt.cli.errors import ExitCode
-from defras_bt.cli.files import find
+from defras_bt.cli.errors import ExitCode, UserError
+from defras_bt.cli.files import find, folder_for
 from defras_bt.executive.proof.prover import prove
 from defras_bt.executive.proof.report import proof_text
 from defras_bt.executive.tree_diff import tree_diff
 from defras_bt.executive.tree_file import read_tree
+from defras_bt.executive.tree_picture import show_svg
 from defras_bt.executive.tree_show import outline_of_spec, show_mermaid, show_text
 
 app = typer.Typer(help="Look at behaviour trees, check and prove them.", no_args_is_help=True)
@@ -22,10 +24,20 @@ Tree = Annotated[str, typer.Argument(help="Tree: a file, or a shipped name.")]
 def show(
     tree: Tree = "defras",
     mermaid: Annotated[bool, typer.Option("--mermaid", help="As a Mermaid diagram.")] = False,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="Draw it into this SVG file.", dir_okay=False)
+    ] = None,
 ) -> None:
-    """Draw a tree in the terminal. Example: defras tree show defras"""
-    outline = outline_of_spec(read_tree(find(tree, "trees")).root)
-    typer.echo(show_mermaid(outline) if mermaid else show_text(outline))
+    """Draw a tree in the terminal. Example: defras tree show defras --picture defras.svg"""
+    outline = outline_of_spec(read_tree(find(tree, "trees"), must_be_guarded=False).root)
+    if picture is None:
+        typer.echo(show_mermaid(outline) if mermaid else show_text(outline))
+        return
+    if picture.suffix != ".svg":
+        raise UserError(f"--picture {picture}: give a file that ends with .svg")
+    folder_for(picture.parent)
+    picture.write_text(show_svg(outline), encoding="utf-8")
+    typer.echo(f"{picture}: {tree} is drawn; open it with a browser")
 
 
 @app.command("check")
