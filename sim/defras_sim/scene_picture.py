@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle, Polygon
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
@@ -38,8 +38,8 @@ def draw_scene(scene: Scene, file: Path, actual: Scene | None = None) -> None:
 
 def _draw_top(axes: Axes, scene: Scene, actual: Scene | None) -> None:
     length, width = 1e3 * scene.tissue.length_x_m, 1e3 * scene.tissue.width_y_m
-    edge = (-length / 2, -width / 2)
-    axes.add_patch(Rectangle(edge, length, width, fc=TISSUE, ec="#8a5a52", lw=1.5))
+    outline = 1e3 * scene.tissue.shape.outline_m
+    axes.add_patch(Polygon(outline, fc=TISSUE, ec="#8a5a52", lw=1.5))
     _draw_holes(axes, scene, actual)
     center = 1e3 * scene.roi_center_m[:2]
     radius = 1e3 * scene.roi.radius_m
@@ -66,7 +66,9 @@ def _draw_top(axes: Axes, scene: Scene, actual: Scene | None) -> None:
 def _draw_holes(axes: Axes, scene: Scene, actual: Scene | None) -> None:
     radius = 1e3 * scene.attachments.hole_radius_m
     true = scene.attached if actual is None else actual.attached
-    for (x, y), believed, holds in zip(1e3 * scene.holes_xy_m, scene.attached, true, strict=True):
+    there = scene.is_hole
+    places = 1e3 * scene.holes_xy_m[there]
+    for (x, y), believed, holds in zip(places, scene.attached[there], true[there], strict=True):
         if not (believed or holds):
             axes.add_patch(Circle((x, y), 0.25 * radius, fc="#c79a92", ec="none"))
             continue
@@ -121,16 +123,14 @@ def _draw_legend(axes: Axes, compared: bool) -> None:
 
 
 def _draw_space(axes: Axes3D, scene: Scene, true: Scene) -> None:
-    half_x, half_y = 500 * scene.tissue.length_x_m, 500 * scene.tissue.width_y_m
-    depth = 1e3 * scene.tissue.thickness_m
-    for z, alpha in ((0.0, 0.45), (-depth, 0.2)):
-        corners = [
-            (-half_x, -half_y, z), (half_x, -half_y, z), (half_x, half_y, z), (-half_x, half_y, z)
-        ]  # fmt: skip
-        axes.add_collection3d(Poly3DCollection([corners], fc=TISSUE, ec="#8a5a52", alpha=alpha))
-    held = 1e3 * true.holes_xy_m[true.attached]
-    for x, y in held:
-        axes.plot([x, x], [y, y], [-depth - 8, -depth], color=HELD, lw=3)
+    for face, alpha in zip(_faces(scene), (0.45, 0.2), strict=True):
+        many = len(face) > 1  # small triangles: their shade shows the shape, edges would hide it
+        edge = {"linewidths": 0.0} if many else {"edgecolors": "#8a5a52"}
+        axes.add_collection3d(
+            Poly3DCollection(face, facecolors=TISSUE, alpha=alpha, shade=many, **edge)
+        )
+    for x, y, z in 1e3 * true.holes_m[true.attached]:
+        axes.plot([x, x], [y, y], [z - 8, z], color=HELD, lw=3)
     rim = _rim(scene)
     axes.add_collection3d(Poly3DCollection([rim.tolist()], fc=REGION, ec=REGION, alpha=0.7))
     target = 1e3 * scene.roi_center_m
@@ -154,5 +154,15 @@ def _draw_space(axes: Axes3D, scene: Scene, true: Scene) -> None:
 def _rim(scene: Scene) -> Floats:
     """The region's border (n, 3) [mm]."""
     angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
-    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(48)])
-    return 1e3 * (scene.roi_center_m + scene.roi.radius_m * circle)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    return 1e3 * scene.under_tissue_m(scene.roi_center_m[:2] + scene.roi.radius_m * circle)
+
+
+def _faces(scene: Scene) -> tuple[list[Floats], list[Floats]]:
+    """Polygons (k, 3) [mm] of the upper face and of the lower one."""
+    anatomy, shape = scene.tissue.anatomy, scene.tissue.shape
+    if anatomy is None:
+        upper, lower = (1e3 * face.at(shape.outline_m) for face in (shape.upper, shape.lower))
+        return [upper], [lower]
+    corners = 1e3 * anatomy.vertices_m[anatomy.triangles]
+    return list(corners[anatomy.side == 1]), list(corners[anatomy.side == -1])
