@@ -12,9 +12,10 @@ from defras_bt.cli.files import find, folder_for
 from defras_bt.executive.proof.prover import prove
 from defras_bt.executive.proof.report import proof_text
 from defras_bt.executive.tree_diff import tree_diff
+from defras_bt.executive.tree_dump import dump_tree
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.executive.tree_picture import show_svg
-from defras_bt.executive.tree_show import outline_of_spec, show_mermaid, show_text
+from defras_bt.executive.tree_show import Outline, outline_of_spec, show_mermaid, show_text
 
 app = typer.Typer(help="Look at behaviour trees, check and prove them.", no_args_is_help=True)
 Tree = Annotated[str, typer.Argument(help="Tree: a file, or a shipped name.")]
@@ -24,15 +25,25 @@ Tree = Annotated[str, typer.Argument(help="Tree: a file, or a shipped name.")]
 def show(
     tree: Tree = "defras",
     mermaid: Annotated[bool, typer.Option("--mermaid", help="As a Mermaid diagram.")] = False,
+    as_yaml: Annotated[
+        bool, typer.Option("--yaml", help="As one file, with its includes put in.")
+    ] = False,
     picture: Annotated[
         Path | None, typer.Option("--picture", help="Draw it into this SVG file.", dir_okay=False)
     ] = None,
 ) -> None:
     """Draw a tree in the terminal. Example: defras tree show defras --picture defras.svg"""
-    outline = outline_of_spec(read_tree(find(tree, "trees"), must_be_guarded=False).root)
-    if picture is None:
+    spec = read_tree(find(tree, "trees"), must_be_guarded=False)
+    outline = outline_of_spec(spec.root)
+    if as_yaml:
+        typer.echo(dump_tree(spec), nl=False)
+    elif picture is None:
         typer.echo(show_mermaid(outline) if mermaid else show_text(outline))
-        return
+    else:
+        _draw(tree, outline, picture)
+
+
+def _draw(tree: str, outline: Outline, picture: Path) -> None:
     if picture.suffix != ".svg":
         raise UserError(f"--picture {picture}: give a file that ends with .svg")
     folder_for(picture.parent)

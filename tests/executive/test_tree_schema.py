@@ -6,7 +6,6 @@ from typing import Literal
 
 import pytest
 from pydantic import BaseModel, Field
-from ruamel.yaml import YAML
 
 from defras_bt.executive.node import Node, NodeParameters
 from defras_bt.executive.registry import Registry, builtin_nodes
@@ -15,51 +14,9 @@ from defras_bt.executive.tree_kinds import KINDS
 from defras_bt.executive.tree_schema import SCHEMA_LINE, main, schema_text, tree_schema
 from defras_sim.resources import resource
 from defras_sim.yaml_source import InvalidFile
+from tests.executive.json_schema import against_schema
 
 TREES = sorted(resource("trees").glob("*.yaml"))
-
-
-def complaints(value, schema, definitions, at="file"):
-    """A JSON schema validator for the few words that the schema uses, after the standard's text."""
-    if "$ref" in schema:
-        schema = definitions[schema["$ref"].removeprefix("#/$defs/")]
-    if "anyOf" in schema:
-        tried = [complaints(value, branch, definitions, at) for branch in schema["anyOf"]]
-        return [] if [] in tried else tried[-1]
-    if "enum" in schema and value not in schema["enum"]:
-        return [f"{at}: not one of {schema['enum']}"]
-    kinds = {"object": dict, "array": list, "string": str, "integer": int, "number": (int, float)}
-    wanted = schema.get("type")
-    if wanted in kinds and not isinstance(value, kinds[wanted]):
-        return [f"{at}: not {wanted}"]
-    found = []
-    if isinstance(value, dict):
-        known = schema.get("properties", {})
-        found += [f"{at}: no {key}" for key in schema.get("required", []) if key not in value]
-        if not schema.get("minProperties", 0) <= len(value) <= schema.get("maxProperties", 99):
-            found.append(f"{at}: number of keys")
-        for key, inside in value.items():
-            if key in known:
-                found += complaints(inside, known[key], definitions, f"{at}.{key}")
-            elif schema.get("additionalProperties") is False:
-                found.append(f"{at}: unknown {key}")
-    if isinstance(value, list):
-        if len(value) < schema.get("minItems", 0):
-            found.append(f"{at}: too short")
-        for index, item in enumerate(value):
-            found += complaints(item, schema.get("items", {}), definitions, f"{at}.{index}")
-    if isinstance(value, str) and not re.search(schema.get("pattern", ""), value):
-        found.append(f"{at}: pattern")
-    if isinstance(value, (int, float)) and (
-        value < schema.get("minimum", value) or value <= schema.get("exclusiveMinimum", value - 1)
-    ):
-        found.append(f"{at}: too small")
-    return found
-
-
-def against_schema(text, nodes):
-    schema = tree_schema(nodes)
-    return complaints(YAML(typ="safe", pure=True).load(text), schema, schema["$defs"])
 
 
 def test_the_schema_beside_the_trees_is_current():
