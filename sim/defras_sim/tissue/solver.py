@@ -44,7 +44,7 @@ class NewtonSettings:
     residual_n: float
     motion_m: float = 1e-5
     max_iterations: int = 100
-    max_factorisations: int = 25
+    max_factorisations: int = 60
     max_step_m: float = 0.01
     sufficient_decrease: float = 1e-4
     min_step_share: float = 1 / 512
@@ -78,6 +78,7 @@ class NewtonSolver:
         self._curvature: Curvature | None = None
         self._known = False
         self._shift_share = 0.0
+        self._last_shift_share = 0.0
 
     def forget(self) -> None:
         """Drop the curvature: the next energy has little in common with the last."""
@@ -131,10 +132,13 @@ class NewtonSolver:
             self._shift_share = self._more_shift()
             return False
         self._known = True
+        self._last_shift_share = self._shift_share or self._last_shift_share
         return True
 
     def _more_shift(self) -> float:
-        return max(_LEAST_SHIFT, 10 * self._shift_share)
+        if self._shift_share > 0:
+            return 10 * self._shift_share
+        return max(_LEAST_SHIFT, 0.1 * self._last_shift_share)
 
     def _excess(self, gradient_n: Floats, step_m: Floats) -> float:
         """How many times too large the unbalanced forces, or the next step, still are."""
