@@ -119,6 +119,16 @@ class FaultInjection:
         self._world = world
         return world
 
+    @property
+    def trips(self) -> list[tuple[str, ...]]:
+        """Per tick, what had to keep the arms still, as those know who made the faults."""
+        return self._world.trips if isinstance(self._world, FaultyWorld) else []
+
+    @property
+    def hangs(self) -> bool:
+        """Whether a node may never return, so that only a deadline ends the run."""
+        return bool(self.faults.of(NodeHangs))
+
     def twin(self, scene: Scene) -> Twin:
         diverges = self.faults.of(TwinDiverges)
         return FaultyTwin(scene, diverges) if diverges else Twin(scene)
