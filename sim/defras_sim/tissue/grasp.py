@@ -12,8 +12,11 @@ from scipy.spatial.transform import Rotation
 from defras_sim.geometry import Floats, Pose
 from defras_sim.rest_shape import Face
 from defras_sim.surface import Surface
+from defras_sim.tissue.dent import Dent
+from defras_sim.tissue.discs import ROW_SHIFTS, disc_rows
 from defras_sim.tissue.mesh import Integers, Mesh, SlabMesh
-from defras_sim.tissue.springs import ROW_SHIFTS, Springs, SpringTerm, disc_rows
+from defras_sim.tissue.springs import Springs, SpringTerm
+from defras_sim.tissue.unresolved import DentsOf
 
 # Stiff enough that a patch under 1 N gives 0.1 mm, soft enough not to spoil the conditioning.
 GRASP_N_PER_M = 1e4
@@ -82,6 +85,7 @@ def grasped_patch(
     center_xy_m: Floats,
     radius_m: float,
     tissue_from_tip: Pose,
+    dents: DentsOf,
 ) -> Grasp:
     """Hold the disc around rest position ``center_xy_m`` (2,) of the upper face as it lies now.
 
@@ -91,13 +95,14 @@ def grasped_patch(
     if isinstance(mesh, SlabMesh) and mesh.element == "tetrahedron4":
         nodes = nodes_under_jaw(mesh, center_xy_m, radius_m)
         rows = sparse.csr_array(sparse.eye_array(len(mesh.nodes_m), format="csr")[nodes])
-        shifts = np.ones(len(nodes))
+        shifts, dent = np.ones(len(nodes)), Dent.none(len(nodes))
     else:
         center = upper.inset(center_xy_m, radius_m)
         rows, shifts = disc_rows(mesh, center[None], radius_m, upper), ROW_SHIFTS
+        dent = dents.at(center[None], radius_m, upper=True)
     held = rows @ positions_m
     from_tip = held - shifts[:, None] * tissue_from_tip.position_m
-    springs = Springs(rows, np.full(len(shifts), GRASP_N_PER_M))
+    springs = Springs(rows, np.full(len(shifts), GRASP_N_PER_M), dent)
     return Grasp(springs, shifts, from_tip @ tissue_from_tip.rotation, tissue_from_tip)
 
 

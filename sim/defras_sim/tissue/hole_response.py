@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
 from defras_sim.geometry import Floats
+from defras_sim.tissue.discs import ROWS
 from defras_sim.tissue.mesh import Integers
 from defras_sim.tissue.response import Solve
-from defras_sim.tissue.springs import ROWS, SpringTerm
+from defras_sim.tissue.springs import SpringTerm
 from defras_sim.tissue.surface import SurfaceMap
 
 
@@ -38,12 +40,17 @@ def hole_response(
     """The response at the equilibrium ``positions_m`` (nodes, 3), where ``solve`` belongs to."""
     chosen = np.asarray(holes, dtype=np.int64)
     rows = (ROWS * chosen[:, None] + np.arange(ROWS)).ravel()
-    on_holes = attachments.springs.rows[rows].toarray()
-    stretch = on_holes @ positions_m - attachments.targets_m[rows]
-    by_node = solve(np.kron(on_holes.T, np.eye(3))).reshape(len(positions_m), -1)
+    on_mesh = attachments.springs.rows[rows].toarray()
+    pulls = attachments.pulls(positions_m)
+    # What a force on the held tissue leaves for the mesh after the dent has taken its share.
+    reaching = linalg.block_diag(*pulls.passed_on[rows])
+    in_dents = linalg.block_diag(*pulls.held_by_force[rows])
+    by_node = solve(np.kron(on_mesh.T, np.eye(3)) @ reaching)
+    on_holes = reaching @ np.kron(on_mesh, np.eye(3)) @ by_node + in_dents
+    on_surface = surface.from_nodes @ by_node.reshape(len(positions_m), -1)
     count, size = len(chosen), 3 * ROWS
     return HoleResponse(
-        (surface.from_nodes @ by_node).reshape(-1, 3, count, size),
-        (on_holes @ by_node).reshape(count, size, count, size),
-        stretch.reshape(count, size),
+        on_surface.reshape(-1, 3, count, size),
+        on_holes.reshape(count, size, count, size),
+        (pulls.held_m - attachments.targets_m)[rows].reshape(count, size),
     )

@@ -7,8 +7,11 @@ from scipy import sparse
 
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
+from defras_sim.tissue.dent import Dent
+from defras_sim.tissue.discs import ROWS, disc_rows
 from defras_sim.tissue.mesh import Mesh
-from defras_sim.tissue.springs import ROWS, Springs, SpringTerm, disc_rows
+from defras_sim.tissue.springs import Springs, SpringTerm
+from defras_sim.tissue.unresolved import DentsOf
 
 TERM_NAME = "attachments"
 
@@ -20,13 +23,17 @@ class Holes:
     the mesh's own unless :meth:`anchor_at` says otherwise.
     """
 
-    def __init__(self, mesh: Mesh, scene: Scene) -> None:
+    def __init__(self, mesh: Mesh, scene: Scene, dents: DentsOf) -> None:
         self._is_hole = scene.is_hole
         rows = disc_rows(
             mesh,
             scene.holes_xy_m[self._is_hole],
             scene.attachments.hole_radius_m,
             scene.tissue.shape.lower,
+        )
+        self._dent = Dent.none(ROWS * len(self._is_hole)).with_some(
+            np.repeat(self._is_hole, ROWS),
+            dents.at(scene.holes_xy_m[self._is_hole], scene.attachments.hole_radius_m, upper=False),
         )
         # Places of the grid without tissue hold nothing: their rows are empty.
         places = sparse.eye_array(ROWS * len(self._is_hole), format="csc")
@@ -63,4 +70,4 @@ class Holes:
         return SpringTerm(TERM_NAME, self._springs, self.targets_m)
 
     def _with_stiffness(self, stiffness_n_per_m: Floats) -> Springs:
-        return Springs(self._rows, np.repeat(stiffness_n_per_m, ROWS))
+        return Springs(self._rows, np.repeat(stiffness_n_per_m, ROWS), self._dent)

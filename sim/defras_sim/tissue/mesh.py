@@ -134,17 +134,23 @@ def tetrahedral_slab(tissue: Tissue, elements_xyz: tuple[int, int, int]) -> tupl
     return origin + lattice * (size / counts), connectivity.reshape(-1, 4)
 
 
-def _hexahedral_slab(tissue: Tissue, elements_xyz: tuple[int, int, int]) -> tuple[Floats, Integers]:
-    size, origin = _box(tissue)
-    counts = np.array(elements_xyz)
+def hexahedral_lattice(counts: Integers) -> tuple[Integers, Integers]:
+    """Nodes (n, 3) of 20-node hexahedra stacked ``counts`` (3,) times along x, y and z, in half
+    elements from the first corner, and connectivity (elements, 20)."""
     fine = 2 * counts + 1  # lattice of corners and middles; the serendipity element has no others
     cells = _lattice(counts)
     offsets = (HEXAHEDRON20_NODES + 1).astype(np.int64)
     corners = 2 * cells[:, None, :] + offsets[None]
     numbers = _number(corners.reshape(-1, 3), fine)
     used, connectivity = np.unique(numbers, return_inverse=True)
-    nodes = origin + _lattice(fine)[used] * (size / (2 * counts))
-    return nodes, connectivity.reshape(len(cells), 20).astype(np.int64)
+    return _lattice(fine)[used], connectivity.reshape(len(cells), 20).astype(np.int64)
+
+
+def _hexahedral_slab(tissue: Tissue, elements_xyz: tuple[int, int, int]) -> tuple[Floats, Integers]:
+    size, origin = _box(tissue)
+    counts = np.array(elements_xyz)
+    lattice, connectivity = hexahedral_lattice(counts)
+    return origin + lattice * (size / (2 * counts)), connectivity
 
 
 def _box(tissue: Tissue) -> tuple[Floats, Floats]:

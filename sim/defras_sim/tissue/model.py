@@ -33,6 +33,7 @@ from defras_sim.tissue.surface import surface_map
 from defras_sim.tissue.terms import Term
 from defras_sim.tissue.tissue_mesh import tissue_mesh
 from defras_sim.tissue.travel import Tips, Traveller
+from defras_sim.tissue.unresolved import DentsOf
 
 __all__ = ["NothingToGrasp", "TissueModel", "TissueSnapshot"]
 
@@ -86,7 +87,8 @@ class TissueModel:
             )
             self._terms[bed.name] = bed
         self._surface = surface_map(self.mesh, tissue)
-        self._holes = Holes(self.mesh, scene)
+        self._dents = DentsOf(self.mesh, tissue, name)
+        self._holes = Holes(self.mesh, scene, self._dents)
         self._grasps: dict[str, Grasp] = {}
         self._solver = NewtonSolver(NewtonSettings(residual_share * body.force_scale_n()))
         self._traveller = Traveller(self._solver, self._energy_at)
@@ -185,7 +187,7 @@ class TissueModel:
         )
         radius = self.scene.grasp.patch_radius_m
         self._grasps[arm] = grips.grasped_patch(
-            self.mesh, upper, self._positions_m, center, radius, tissue_from_tip
+            self.mesh, upper, self._positions_m, center, radius, tissue_from_tip, self._dents
         )
         self._changed()
 

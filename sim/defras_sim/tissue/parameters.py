@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from defras_sim.geometry import Floats
+from defras_sim.tissue.discs import ROWS
 from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.grasp import Grasp, term_name
 from defras_sim.tissue.holes import TERM_NAME as ATTACHMENTS
-from defras_sim.tissue.springs import ROWS, SpringTerm
+from defras_sim.tissue.springs import SpringTerm
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,10 @@ def change_of(
                 f"{parameter.arm} holds no tissue, so its tip moves nothing; holding: "
                 f"{', '.join(grasps) or 'none'}"
             )
-        pull = grasp.springs.stiffness_n_per_m[:, None, None] * grasp.targets_by_tip_m()
-        return _through_springs(spring_term(energy, term_name(parameter.arm)), pull)
+        held_by = spring_term(energy, term_name(parameter.arm))
+        return _through_springs(
+            held_by, held_by.pulls(positions_m).stiffness_n_per_m @ grasp.targets_by_tip_m()
+        )
     if isinstance(parameter, HoleStiffness):
         held = spring_term(energy, ATTACHMENTS)
         holes = len(held.targets_m) // ROWS
@@ -89,14 +92,14 @@ def change_of(
             raise ValueError(f"there is no hole {parameter.hole}; holes are 0 to {holes - 1}")
         pull = np.zeros((len(held.targets_m), 3, 1))
         rows = slice(ROWS * parameter.hole, ROWS * (parameter.hole + 1))
-        pull[rows, :, 0] = (held.targets_m - held.springs.rows @ positions_m)[rows]
+        pull[rows, :, 0] = held.pulls(positions_m).forces_by_stiffness[rows]
         return _through_springs(held, pull)
     term = energy.terms.get(parameter.term)
     if term is None:
         raise ValueError(f"there is no term {parameter.term!r}; terms: {', '.join(energy.terms)}")
     gradient_by = term.gradient_by(parameter.parameter, positions_m)[:, :, None]
     if isinstance(term, SpringTerm):
-        return Change(gradient_by, term.name, term.forces_n(positions_m)[:, :, None])
+        return Change(gradient_by, term.name, term.forces_by_scale_n(positions_m)[:, :, None])
     return Change(gradient_by)
 
 

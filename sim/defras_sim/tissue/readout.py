@@ -7,9 +7,10 @@ from collections.abc import Iterable, Mapping
 from defras_sim.geometry import Floats
 from defras_sim.tissue import integration
 from defras_sim.tissue.assembly import ElasticBody
+from defras_sim.tissue.discs import net_force
 from defras_sim.tissue.grasp import Grasp
 from defras_sim.tissue.material_points import MaterialTerm
-from defras_sim.tissue.springs import SpringTerm, net_force
+from defras_sim.tissue.springs import SpringTerm
 from defras_sim.tissue.state import TissueState, Wrench
 from defras_sim.tissue.surface import SurfaceMap
 from defras_sim.tissue.terms import Term
@@ -38,6 +39,8 @@ def tissue_state(
         if isinstance(term, ElasticBody | MaterialTerm):
             energy_j += energy
         else:
+            if isinstance(term, SpringTerm):
+                energy_j += term.strain_energy_j(positions_m)
             wrenches[term.name] = Wrench.of(-gradient, positions_m)
     stress_pa, stress_at_m = largest_principal_stress(terms, positions_m)
     return TissueState(

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from defras_sim.geometry import Floats
+from defras_sim.tissue.discs import ROWS
 from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.grasp import Grasp
 from defras_sim.tissue.holes import TERM_NAME as ATTACHMENTS
@@ -26,7 +27,7 @@ from defras_sim.tissue.parameters import (
     spring_term,
 )
 from defras_sim.tissue.response import Solve
-from defras_sim.tissue.springs import ROWS, SpringTerm
+from defras_sim.tissue.springs import SpringTerm
 from defras_sim.tissue.surface import SurfaceMap
 
 BED = "bed"
@@ -83,7 +84,7 @@ def sensitivities(
     nodes_by = solve(right.reshape(-1, size)).reshape(right.shape)
 
     def forces_by(term: SpringTerm) -> Floats:
-        by = -term.springs.stiffness_n_per_m[:, None, None] * _applied(term.springs.rows, nodes_by)
+        by = -term.pulls(positions_m).stiffness_n_per_m @ _applied(term.springs.rows, nodes_by)
         for parameter, change in changes.items():
             if change.spring_term == term.name and change.spring_forces_by is not None:
                 by[:, :, columns[parameter]] += change.spring_forces_by

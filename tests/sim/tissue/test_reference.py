@@ -7,12 +7,13 @@ from scipy import sparse
 
 from defras_sim.scene import Tissue
 from defras_sim.tissue.assembly import ElasticBody
+from defras_sim.tissue.discs import ROW_SHIFTS, disc_rows
 from defras_sim.tissue.elements import gauss_hexahedron
 from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import slab_mesh
 from defras_sim.tissue.solver import NewtonSettings, NewtonSolver
-from defras_sim.tissue.springs import ROW_SHIFTS, Springs, SpringTerm, disc_rows, joined
+from defras_sim.tissue.springs import Springs, SpringTerm, joined
 
 E, NU = 3000.0, 0.45
 PRESCRIBED_N_PER_M = 1e7  # far above the stiffest mode of the mesh, 4e3 N/m

@@ -3,9 +3,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from defras_sim.scene import Tissue
+from defras_sim.tissue.discs import disc_rows, net_force
 from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.mesh import slab_mesh
-from defras_sim.tissue.springs import Springs, SpringTerm, disc_rows, joined, net_force
+from defras_sim.tissue.springs import Springs, SpringTerm, joined
 
 CENTER = np.array([[0.011, -0.02]])
 
