@@ -88,7 +88,7 @@ def test_every_claim_is_looked_at_where_it_concerns_the_tree(defras):
 @pytest.mark.parametrize("name", DEFRAS_MUTANTS)
 def test_an_unsafe_change_is_refuted_by_ticks_that_py_trees_repeats(defras, name):
     """Every example is carried out by py_trees before it is told."""
-    proof = prove(mutant(defras, name))
+    proof = prove(mutant(defras, name), [1])
     claims, at_fault = EXPECTED[name]
     refuted = {refutation.claim.name: refutation for refutation in proof.refuted}
     assert claims <= set(refuted)
@@ -99,7 +99,7 @@ def test_an_unsafe_change_is_refuted_by_ticks_that_py_trees_repeats(defras, name
 
 
 def test_the_report_names_the_composite_its_place_and_the_ticks(defras):
-    text = proof_text(prove(mutant(defras, "guards are not looked at again")))
+    text = proof_text(prove(mutant(defras, "guards are not looked at again"), [1]))
     lines = text.splitlines()
     assert lines[0].startswith("✗ guards_first: no motion leaf is ticked unless")
     assert "✓ well_kept: every tick and every new plan leave the tree in a state" in text
@@ -149,7 +149,7 @@ def breaches(toys, tree, chance, ticks):
 def test_what_the_check_of_files_accepts_is_proved_and_what_runs_on_is_refuted(toys):
     chance = random.Random(5)
     accepted = refuted = running_on = 0
-    for _ in range(100):
+    for _ in range(70):
         spec = random_spec(
             toys.registry, chance, inner=SIMPLE, guard_first=0.7, deepest=3, most_children=3
         )
@@ -233,7 +233,7 @@ def test_three_actions_stand_for_any_number(toys):
 
 def test_longer_plans_refute_nothing_more(defras):
     """On mutants, where there is something to refute."""
-    for name in ("guards run beside the plan", "guards are not looked at again"):
+    for name in ("the sensors are looked at once", "no look at the force"):
         tree = mutant(defras, name)
         short = {refutation.claim.name for refutation in prove(tree).refuted}
         long = {refutation.claim.name for refutation in prove(tree, [5]).refuted}

@@ -11,7 +11,7 @@ from itertools import count
 
 import py_trees
 import pytest
-from clingo import Control
+from clingo import Control, SymbolType
 from py_trees.common import Status
 
 from defras_bt.executive.composites import PlanSlot
@@ -162,17 +162,19 @@ def predicted(facts):
     control.load(str(resource("asp/tree_semantics.lp")))
     control.add("base", [], "\n".join(facts))
     control.ground([("base", [])])
-    after, ticked, stops = set(), set(), {}
-    for atom in control.symbolic_atoms:
-        name, values = atom.symbol.name, atom.symbol.arguments
-        if name in NEXT:
+    atoms = control.symbolic_atoms
+    after, stops = set(), {}
+    for name, before in NEXT.items():
+        for atom in atoms.by_signature(name, 1 if name == "next_live" else 2):
             assert atom.is_fact
-            plain = [v.number if v.type.name == "Number" else v.name for v in values]
-            after.add((NEXT[name], *plain))
-        elif name == "ticked":
-            ticked.add(values[0].number)
-        elif name in ("before", "behind"):
-            stops.setdefault(values[0].number, set()).add((name, values[1].number))
+            values = atom.symbol.arguments
+            plain = [v.number if v.type == SymbolType.Number else v.name for v in values]
+            after.add((before, *plain))
+    ticked = {atom.symbol.arguments[0].number for atom in atoms.by_signature("ticked", 1)}
+    for phase in ("before", "behind"):
+        for atom in atoms.by_signature(phase, 2):
+            node, by = atom.symbol.arguments
+            stops.setdefault(node.number, set()).add((phase, by.number))
     return after, ticked, stops
 
 
