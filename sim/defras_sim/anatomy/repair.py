@@ -18,7 +18,7 @@ Triangles = NDArray[np.int64]
 # Vertices nearer to each other than this share of the surface's size are one.
 _SAME = 1e-6
 # A hole around which it is less far than this share of the surface's size is closed.
-SMALL_HOLE = 0.15
+SMALL_HOLE = 0.25
 
 
 @dataclass(frozen=True)
