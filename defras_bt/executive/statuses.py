@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from uuid import UUID
+from typing import NamedTuple
 
 import py_trees
 from py_trees.behaviour import Behaviour
@@ -12,7 +12,7 @@ from py_trees.common import Status
 
 from defras_bt.executive.blackboard import Blackboard
 from defras_bt.executive.composites import PlanSlot
-from defras_bt.executive.loader import LoadedTree
+from defras_bt.executive.loader import LoadedTree, walk
 from defras_bt.executive.node import Node
 from defras_bt.executive.reasons import Code
 from defras_bt.recording.record import Cause
@@ -38,15 +38,58 @@ class TreeSnapshot:
     stopped_by: Cause | None
 
 
-@dataclass(frozen=True)
-class _Word:
+class _Word(NamedTuple):
     """What one node said when it was ticked; ``leaf`` is the one that the words come from."""
 
     status: Status
     code: str
     message: str
-    decider: UUID | None
-    leaf: UUID
+    decider: Behaviour | None
+    leaf: Behaviour
+
+
+class _Words:
+    """The last words of every node of a tree by path, brought up to date tick by tick."""
+
+    def __init__(self, paths: Mapping[Behaviour, str], ever: Mapping[Behaviour, _Word]) -> None:
+        self.paths = paths
+        self._silence = dict.fromkeys(paths.values(), "")
+        self._last_status: dict[str, str] = {}
+        self._code: dict[str, str] = {}
+        self._message = dict(self._silence)
+        self._decider: dict[str, str] = {}
+        self._take(ever)
+
+    def snapshot(
+        self, now: Mapping[Behaviour, _Word], cause: Cause | None, stopped_by: Cause | None
+    ) -> TreeSnapshot:
+        """What stands after a tick in which the nodes of ``now`` spoke."""
+        return TreeSnapshot(
+            status=self._silence | self._take(now),
+            last_status=dict(self._last_status),
+            code=dict(self._code),
+            message=dict(self._message),
+            decider=dict(self._decider),
+            cause=cause,
+            stopped_by=stopped_by,
+        )
+
+    def _take(self, words: Mapping[Behaviour, _Word]) -> dict[str, str]:
+        """Take note of words; returns the statuses in them by path."""
+        statuses: dict[str, str] = {}
+        for node, (status, code, message, decider, _) in words.items():
+            path = self.paths.get(node)
+            if path is None:
+                continue
+            statuses[path] = self._last_status[path] = status.name
+            self._code[path] = code
+            self._message[path] = message
+            by = self.paths.get(decider) if decider is not None else None
+            if by is None:
+                self._decider.pop(path, None)
+            else:
+                self._decider[path] = by
+        return statuses
 
 
 class TickedVisitor(py_trees.visitors.VisitorBase):
@@ -61,70 +104,71 @@ class TickedVisitor(py_trees.visitors.VisitorBase):
         self._board = board
         self._tree = tree
         self._carries_out = carries_out_plans(tree.plan_slot)
-        self._now: dict[UUID, _Word] = {}
-        self._ever: dict[UUID, _Word] = {}
+        self._now: dict[Behaviour, _Word] = {}
+        self._ever: dict[Behaviour, _Word] = {}
+        self._plan: list[Behaviour] | None = None
+        self._words = _Words({}, {})
 
     def initialise(self) -> None:
         self._now = {}
 
     def run(self, behaviour: Behaviour) -> None:
         word = self._word(behaviour)
-        self._now[behaviour.id] = self._ever[behaviour.id] = word
+        self._now[behaviour] = self._ever[behaviour] = word
         if behaviour is self._carries_out and word.status == Status.FAILURE:
             self._board.failure = Cause(word.code, word.message)
 
     def snapshot(self) -> TreeSnapshot:
         """The tick that just ended."""
-        paths = self._tree.paths()
-        self._ever = {id_: word for id_, word in self._ever.items() if id_ in paths}
-        ever = {paths[id_]: word for id_, word in self._ever.items()}
-        now = {path: self._now.get(id_) for id_, path in paths.items()}
-        stop = self._now.get(self._carries_out.id) if self._carries_out is not None else None
+        slot = self._tree.plan_slot
+        plan = [] if slot is None else list(slot.children)
+        if plan != self._plan:
+            # Only filling and emptying the slot changes the tree.
+            self._plan = plan
+            paths = dict(walk(self._tree.root))
+            self._ever = {node: word for node, word in self._ever.items() if node in paths}
+            self._words = _Words(paths, self._ever)
+        stop = self._now.get(self._carries_out) if self._carries_out is not None else None
         stopped = stop is not None and stop.status == Status.FAILURE
-        return TreeSnapshot(
-            status={path: word.status.name if word else "" for path, word in now.items()},
-            last_status={path: word.status.name for path, word in ever.items()},
-            code={path: word.code for path, word in ever.items()},
-            message={path: ever[path].message if path in ever else "" for path in now},
-            decider={
-                path: paths[word.decider]
-                for path, word in ever.items()
-                if word.decider is not None and word.decider in paths
-            },
-            cause=self._cause(self._now.get(self._tree.root.id), paths),
-            stopped_by=self._cause(stop, paths) if stopped else None,
+        return self._words.snapshot(
+            self._now,
+            self._cause(self._now.get(self._tree.root)),
+            self._cause(stop) if stopped else None,
         )
 
     def _word(self, behaviour: Behaviour) -> _Word:
         status = behaviour.status
         decider = deciding_child(behaviour, self._now)
         if decider is not None:
-            heard = self._now[decider.id]
-            return _Word(status, heard.code, heard.message, decider.id, heard.leaf)
+            heard = self._now[decider]
+            return _Word(status, heard.code, heard.message, decider, heard.leaf)
         # Only leaves and the plan slot have words of their own.
         code = behaviour.code if isinstance(behaviour, Node | PlanSlot) else ""
-        return _Word(status, code, behaviour.feedback_message, None, behaviour.id)
+        return _Word(status, code, behaviour.feedback_message, None, behaviour)
 
-    @staticmethod
-    def _cause(word: _Word | None, paths: Mapping[UUID, str]) -> Cause | None:
-        return Cause(word.code, word.message, paths.get(word.leaf, "")) if word else None
+    def _cause(self, word: _Word | None) -> Cause | None:
+        if word is None:
+            return None
+        return Cause(word.code, word.message, self._words.paths.get(word.leaf, ""))
 
 
-def deciding_child(parent: Behaviour, heard: Mapping[UUID, _Word]) -> Behaviour | None:
+def deciding_child(parent: Behaviour, heard: Mapping[Behaviour, _Word]) -> Behaviour | None:
     """The child that made ``parent``'s status what it is; None if none was ticked.
 
     Of a decorator it is what it decorates. Otherwise it is the last ticked child with the parent's
     status: the one that stopped a sequence or was chosen by a selector. Where all children of a
     selector failed, one that was not even tried decides nothing. Call it as soon as ``parent`` was
-    ticked; ``heard`` has what was ticked in this tick, by id.
+    ticked; ``heard`` has what was ticked in this tick.
     """
-    ticked = [child for child in parent.children if child.id in heard]
-    if isinstance(parent, py_trees.decorators.Decorator):
+    if not parent.children:
+        return None
+    ticked = [child for child in parent.children if child in heard]
+    if not ticked or isinstance(parent, py_trees.decorators.Decorator):
         return ticked[-1] if ticked else None
-    same = [child for child in ticked if heard[child.id].status == parent.status]
-    tried = [child for child in same if heard[child.id].code != Code.WOULD_NOT_HELP]
+    same = [child for child in ticked if heard[child].status == parent.status]
+    tried = [child for child in same if heard[child].code != Code.WOULD_NOT_HELP]
     candidates = tried or same or ticked
-    return candidates[-1] if candidates else None
+    return candidates[-1]
 
 
 def carries_out_plans(slot: PlanSlot | None) -> Behaviour | None:
