@@ -55,12 +55,14 @@ def outline_of_spec(spec: NodeSpec, above: str = "") -> Outline:
     """Outline of a tree as it stands in its files; nothing needs to be there to run it."""
     path = f"{above}{spec.name}"
     given = spec.options.model_dump(exclude_defaults=True)
+    wires = {port: key for port, key in spec.keys.items() if port != key}
     return Outline(
         path,
         spec.name,
         spec.kind,
         "" if spec.node_class is None else spec.node_class.role,
-        "".join(f" {key}={value}" for key, value in given.items()),
+        "".join(f" {key}={value}" for key, value in given.items())
+        + "".join(f" {port}@{key}" for port, key in wires.items()),
         tuple(outline_of_spec(child, f"{path}/") for child in spec.children),
     )
 

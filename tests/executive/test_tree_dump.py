@@ -3,6 +3,8 @@
 import random
 
 import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
 
 from defras_bt.executive.tree_diff import tree_diff
 from defras_bt.executive.tree_dump import dump_tree
@@ -37,19 +39,21 @@ def test_shipped_trees_are_the_same_after_a_round_trip(file, tmp_path):
     assert dump_tree(again) == text
 
 
-def test_random_trees_are_the_same_after_a_round_trip(toys, tmp_path):
+seeds = st.integers(0, 2**32 - 1).map(random.Random)
+
+
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(chance=seeds)
+def test_random_trees_are_the_same_after_a_round_trip(chance, toys, tmp_path):
     """No valid file is rejected, and what it says is what is read."""
-    chance = random.Random(6)
-    file = tmp_path / "random.yaml"
-    for _ in range(150):
-        spec = random_spec(toys.registry, chance, leaves=("Watch", "Push", "Think", "Mend"))
-        tree = TreeSpec("n", "", spec)
-        text = dump_tree(tree)
-        assert against_schema(text, toys.registry.nodes()) == []
-        file.write_text(text)
-        again = read_tree(file, toys.registry, must_be_guarded=False)
-        assert plain(again) == plain(tree)
-        assert tree_diff(tree, again) == []
+    spec = random_spec(toys.registry, chance, leaves=("Watch", "Push", "Think", "Mend"))
+    tree, file = TreeSpec("n", "", spec), tmp_path / "random.yaml"
+    text = dump_tree(tree)
+    assert against_schema(text, toys.registry.nodes()) == []
+    file.write_text(text)
+    again = read_tree(file, toys.registry, must_be_guarded=False)
+    assert plain(again) == plain(tree)
+    assert tree_diff(tree, again) == []
 
 
 def test_ports_are_the_same_after_a_round_trip(write_tree):
@@ -89,38 +93,33 @@ tree:
 # Trees that are valid but for one thing, which has to be refused.
 
 INVALID = {
-    "an unknown node": lambda text, _: text.replace("Think", "Thinkk", 1),
-    "an unknown key": lambda text, _: text.replace("children:", "childrens:", 1),
-    "no children": lambda text, _: text.replace("children:", "children: []\n#", 1),
-    "one child in a list": lambda text, _: text.replace("child:", "child: [Think]\n#", 1),
-    "an unknown top key": lambda text, _: text + "\nauthor: me\n",
-    "a tree without a name": lambda text, _: text.replace("name: n", "", 1),
-    "a name with capitals": lambda text, _: text.replace("name: n", "name: N", 1),
-    "a metric that is not there": lambda text, _: "metric: mean\n" + text,
-    "two trees": lambda text, _: text + "\ntree: Think\n",
-    "a negative count": lambda text, _: text.replace("attempts: ", "attempts: -", 1),
-    "a port of a leaf without one": lambda text, _: text.replace(
+    "an unknown node": lambda text: text.replace("Think", "Thinkk", 1),
+    "an unknown key": lambda text: text.replace("children:", "childrens:", 1),
+    "no children": lambda text: text.replace("children:", "children: []\n#", 1),
+    "one child in a list": lambda text: text.replace("child:", "child: [Think]\n#", 1),
+    "an unknown top key": lambda text: text + "\nauthor: me\n",
+    "a tree without a name": lambda text: text.replace("name: n", "", 1),
+    "a name with capitals": lambda text: text.replace("name: n", "name: N", 1),
+    "a metric that is not there": lambda text: "metric: mean\n" + text,
+    "two trees": lambda text: text + "\ntree: Think\n",
+    "a negative count": lambda text: text.replace("attempts: ", "attempts: -", 1),
+    "a port of a leaf without one": lambda text: text.replace(
         "Think: {", "Think: {ports: {x: y}, ", 1
     ),
 }
 
 
-@pytest.mark.parametrize("what", INVALID)
-def test_no_tree_with_one_thing_wrong_is_accepted(what, toys, tmp_path):
-    chance = random.Random(8)
+@settings(max_examples=80, suppress_health_check=list(HealthCheck))
+@given(what=st.sampled_from(sorted(INVALID)), chance=seeds)
+def test_no_tree_with_one_thing_wrong_is_accepted(what, chance, toys, tmp_path):
+    spec = random_spec(toys.registry, chance, leaves=("Think", "Mend"), deepest=3)
+    text = dump_tree(TreeSpec("n", "", spec))
+    wrong = INVALID[what](text)
+    assume(wrong != text)
     file = tmp_path / "invalid.yaml"
-    tried = 0
-    for _ in range(60):
-        spec = random_spec(toys.registry, chance, leaves=("Think", "Mend"), deepest=3)
-        text = dump_tree(TreeSpec("n", "", spec))
-        wrong = INVALID[what](text, chance)
-        if wrong == text:
-            continue
-        tried += 1
-        file.write_text(wrong)
-        with pytest.raises(InvalidFile):
-            read_tree(file, toys.registry)
-    assert tried
+    file.write_text(wrong)
+    with pytest.raises(InvalidFile):
+        read_tree(file, toys.registry)
 
 
 def test_fuzzed_files_are_read_or_refused(tmp_path):

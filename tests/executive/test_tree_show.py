@@ -10,6 +10,8 @@ from defras_bt.executive.tree_show import (
     show_mermaid,
     show_text,
 )
+from tests.executive.port_toys import port_registry
+from tests.executive.test_tree_ports import HOLD
 
 TREE = """
 reactive_selector:
@@ -39,6 +41,28 @@ def test_a_file_is_shown_without_anything_to_run_it(tree, tmp_path, toys):
         "│  │  └─ ↻ mend",
         "│  └─ ▤ act (plan_slot)",
         "└─ • think",
+    ]
+
+
+def test_ports_are_shown_with_their_keys(write_tree):
+    write_tree(HOLD, "hold.yaml")
+    text = """
+name: toy
+tree:
+  sequence:
+    children:
+      - Measure
+      - subtree: {file: hold.yaml, ports: {wanted_n: tension_n}}
+      - subtree: {file: hold.yaml, name: strong, ports: {wanted_n: 2}}
+"""
+    spec = read_tree(write_tree(text), port_registry()).root
+    assert show_text(outline_of_spec(spec)).splitlines() == [
+        "→ toy (sequence)",
+        "├─ • measure",
+        "├─ ⇉ hold (reactive)",
+        "│  └─ • hold wanted_n@tension_n",
+        "└─ ⇉ strong (reactive)",
+        "   └─ • hold wanted_n@toy/strong/wanted_n",
     ]
 
 
