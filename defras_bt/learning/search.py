@@ -185,7 +185,8 @@ class AttachmentSearch:
             self._misfits = known
             forces = [np.linalg.norm(state.attachment_forces_n, axis=1) for state in states]
             self._force_n = np.max(forces, axis=0)
-            moved = [_moved_m(state.surface, self._belief) for state in states]
+            rest = self._replay.model.rest_surface
+            moved = [_moved_m(state.surface, rest, self._belief) for state in states]
             self._stretch_m = np.max(moved, axis=0)
         residuals = [cells.residual_m(each) for cells, each in zip(self._cells, known, strict=True)]
         return float(self._cost.of(residuals, attached[None])[0])
@@ -225,10 +226,10 @@ class AttachmentSearch:
         return np.where(self._belief.is_hole, np.where(attached, 1.0 - wrong, wrong), 0.0)
 
 
-def _moved_m(surface: Surface, scene: Scene) -> Floats:
-    """How far (holes,) the lower face has moved off each hole."""
+def _moved_m(surface: Surface, rest: Surface, scene: Scene) -> Floats:
+    """How far (holes,) the lower face has moved from where it rests over each hole."""
     lower = np.flatnonzero(~surface.upper)
     nearest = cKDTree(surface.rest_xy_m[lower]).query(scene.holes_xy_m)[1]
     over = lower[nearest]
-    rest = scene.tissue.shape.lower.at(surface.rest_xy_m[over])
-    return np.asarray(np.linalg.norm(surface.vertices_m[over] - rest, axis=1))
+    moved_m = surface.vertices_m[over] - rest.vertices_m[over]
+    return np.asarray(np.linalg.norm(moved_m, axis=1))

@@ -21,6 +21,8 @@ _MOST_ELEMENTS = 64
 """Along one side. A mesh this fine already needs minutes for one step."""
 _MOST_HOLES = 2500
 _BOX_TOLERANCE_M = 5e-4
+_MOST_SAG = 0.2
+"""Of weight over an area to Young's modulus: about how much thinner lying makes the tissue."""
 
 
 def scene_faults(scene: Scene) -> Iterator[SceneFault]:
@@ -44,6 +46,7 @@ def scene_faults(scene: Scene) -> Iterator[SceneFault]:
         return
     yield from _attachment_faults(scene)
     yield from _place_faults(scene)
+    yield from _weight_faults(scene)
     yield from _mesh_faults(scene)
     yield from _setup_faults(scene)
     yield from _advice_faults(scene)
@@ -132,6 +135,26 @@ def _place_faults(scene: Scene) -> Iterator[SceneFault]:
             ("grasp", "margin_m"),
             f"grasp.margin_m: {grid.margin_m} leaves no room for grasp points; at most "
             f"{max(room_m, 0.0):.4f} for patch_radius_m {grid.patch_radius_m}",
+        )
+
+
+def _weight_faults(scene: Scene) -> Iterator[SceneFault]:
+    """Heavy tissue has to lie on something, and to keep its shape while it does."""
+    tissue = scene.tissue
+    if tissue.gravity_m_s2 == 0.0:
+        return
+    if not tissue.bed:
+        yield (
+            ("tissue", "gravity_m_s2"),
+            f"tissue.gravity_m_s2: {tissue.gravity_m_s2} lets tissue without a bed hang where no "
+            "grasp point is; give it its bed (bed: true), or no gravity",
+        )
+    pressure_pa = tissue.density_kg_m3 * tissue.gravity_m_s2 * tissue.thickness_m
+    if pressure_pa > _MOST_SAG * tissue.young_modulus_pa:
+        yield (
+            ("tissue", "young_modulus_pa"),
+            f"tissue.young_modulus_pa: {tissue.young_modulus_pa} is too soft to carry its own "
+            f"weight; at least {pressure_pa / _MOST_SAG:.0f} for this thickness and density",
         )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import ElementName, MaterialName, Scene
+from defras_sim.surface import Surface
 from defras_sim.tissue import grasp as grips
 from defras_sim.tissue import holes as attachments
 from defras_sim.tissue.assembly import ElasticBody
@@ -166,6 +167,11 @@ class TissueModel:
             self._rest_m = settled(self._solver, energy, self._rest_m).positions_m
             self._rest_is_known = True
         return self._rest_m
+
+    @property
+    def rest_surface(self) -> Surface:
+        """The surface where nobody holds the tissue."""
+        return self._surface.surface(self.rest_m)
 
     @property
     def grasped_arms(self) -> tuple[str, ...]:

@@ -19,16 +19,12 @@ from defras_sim.tissue.mesh import slab_mesh
 from defras_sim.tissue.surface import surface_map
 from defras_sim.worlds.colours import TISSUE
 
-DENSITY_KG_M3 = 1000.0
 CONTACT_MARGIN_M = 0.001
 _ROUNDING_M = 1e-6
 
 
 class BulletTissue:
-    """Linear tetrahedra with PyBullet's neo-Hookean law, without gravity.
-
-    With gravity the slab alone would weigh more than twice the paper's force threshold.
-    """
+    """Linear tetrahedra with PyBullet's neo-Hookean law."""
 
     def __init__(self, client: Any, scene: Scene) -> None:
         """``client``: a pybullet client in deformable mode."""
@@ -96,7 +92,7 @@ class BulletTissue:
             _write_vtk(file, self._rest_m, tetrahedra)
             body = self._client.loadSoftBody(
                 str(file),
-                mass=DENSITY_KG_M3 * volume_m3,
+                mass=tissue.density_kg_m3 * volume_m3,
                 useNeoHookean=1,
                 NeoHookeanMu=mu,
                 NeoHookeanLambda=lam,

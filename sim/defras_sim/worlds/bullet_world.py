@@ -37,6 +37,7 @@ _ROI_DISC_M = 0.0002
 _BED_HALF_M = 0.25
 _BED_HALF_THICKNESS_M = 0.02
 _EXPLODED_M = 1.0
+_SETTLING_S = 1.0
 
 
 class BulletWorld:
@@ -55,7 +56,7 @@ class BulletWorld:
         with without_native_output():
             self._client: Any = BulletClient(connection_mode=pybullet.DIRECT)
             self._client.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
-            self._client.setGravity(0, 0, 0)
+            self._client.setGravity(0, 0, -scene.tissue.gravity_m_s2)
             self._client.setTimeStep(scene.tick_s / self._steps)
             self._lay_bed()
             self._tissue = BulletTissue(self._client, scene)
@@ -63,6 +64,8 @@ class BulletWorld:
                 name: BulletArm(self._client, name, np.array(arm.rcm_m), np.array(arm.home_tip_m))
                 for name, arm in scene.arms.items()
             }
+            if scene.tissue.gravity_m_s2 > 0:
+                self._let_settle()
         self._latest = Observation(0.0, {})
         self._sense()
 
@@ -125,6 +128,14 @@ class BulletWorld:
                 nodes = self._tissue.patch_at(tip_m)
                 arm.anchors = self._tissue.grip(arm.grip, arm.carry(), nodes)
                 arm.jaw_rad = JAW_ON_TISSUE_RAD
+
+    def _let_settle(self) -> None:
+        """Before the first tick tissue with weight comes to lie on its bed."""
+        for _ in range(
+            round(_SETTLING_S / self._client.getPhysicsEngineParameters()["fixedTimeStep"])
+        ):
+            self._client.stepSimulation()
+        self._check_sound()
 
     def _check_sound(self) -> None:
         nodes_m = self._tissue.nodes_m()

@@ -54,6 +54,16 @@ def test_the_good_file_is_good(tmp_path: Path) -> None:
             ("outside the tissue", "0.045"),
         ),
         (GOOD.replace("roi:", "region:"), "2:1", ("region: unknown key",)),
+        (
+            GOOD + "tissue:\n  bed: false\n  gravity_m_s2: 9.81\n",
+            "21:3",
+            ("without a bed", "(bed: true)"),
+        ),
+        (
+            GOOD + "tissue:\n  young_modulus_pa: 100\n  gravity_m_s2: 9.81\n",
+            "20:3",
+            ("too soft to carry its own weight", "at least 245"),
+        ),
         (GOOD.replace("#", "."), "6:3", ("no hole holds", "mark at least one with #")),
         (GOOD.replace(MAP, MAP[21:]), "6:3", ("11 rows", "needs 12")),
         (GOOD.replace("############", "####", 1), "7:7", ("'####'", "12 characters")),

@@ -27,6 +27,17 @@ def raised(tissue: TissueModel, lift_m: float, back_m: float = 0.0) -> None:
     assert tissue.solve({"psm1": TIP.moved(np.array([-back_m, 0.0, lift_m]))}).converged
 
 
+def test_lying_tissue_is_thinned_by_its_weight_as_a_free_column() -> None:
+    """Stress rising to rho g h over the height: thinner by rho g h^2 / 2 E, apart from the rim."""
+    surface = heavy().solve({}).surface
+    inner = np.abs(surface.rest_xy_m).max(axis=1) < 0.03
+    height_m = surface.vertices_m[:, 2]
+    thinned = HEIGHT_M - height_m[inner & surface.upper] + height_m[inner & ~surface.upper]
+    expected = DENSITY * G * HEIGHT_M**2 / (2 * Tissue().young_modulus_pa)
+    assert thinned.mean() == pytest.approx(expected, rel=0.04)
+    np.testing.assert_allclose(thinned, expected, rtol=0.2)
+
+
 def test_attachments_do_not_pull_at_tissue_that_lies_as_it_lay_when_they_grew() -> None:
     state = heavy().solve({})
     weight = DENSITY * G * 0.12 * 0.12 * HEIGHT_M
@@ -97,6 +108,14 @@ def test_without_weight_rest_is_the_mesh_itself() -> None:
     raised(tissue, 0.02)
     tissue.release("psm1")
     np.testing.assert_array_equal(tissue.solve({}).nodes_m, tissue.mesh.nodes_m)
+
+
+def test_the_softest_tissue_that_a_scene_may_have_finds_its_place() -> None:
+    """Scenes refuse softer ones: see the fault of tissue.young_modulus_pa."""
+    state = heavy(young_modulus_pa=DENSITY * G * HEIGHT_M / 0.2).solve({})
+    assert state.converged
+    upper = state.surface.vertices_m[state.surface.upper]
+    assert -0.3 * HEIGHT_M < upper[:, 2].min() < upper[:, 2].max() < -0.05 * HEIGHT_M
 
 
 def test_tissue_that_cannot_carry_its_weight_is_told() -> None:

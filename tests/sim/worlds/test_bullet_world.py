@@ -155,6 +155,19 @@ def test_silence_is_a_hold_and_equal_commands_give_equal_worlds(scene):
     np.testing.assert_array_equal(ends[0][2].depth_m, ends[1][2].depth_m)
 
 
+def test_heavy_tissue_has_come_to_lie_when_the_first_picture_is_taken(scene):
+    heavy = scene.tissue.model_copy(update={"gravity_m_s2": 9.81})
+    scene = scene.model_copy(update={"tissue": heavy})
+    world = BulletWorld(scene, np.random.default_rng(0))
+    lying = world.true_surface().vertices_m
+    world.step()
+    assert np.abs(world.true_surface().vertices_m - lying).max() < 1e-4
+    expected = Twin(scene.for_bullet()).state.surface.vertices_m
+    assert np.abs(lying[:, 2] - expected[:, 2]).max() < 3e-4
+    assert lying[:, 2].min() < -heavy.thickness_m
+    world.close()
+
+
 def test_commands_that_make_no_sense_are_refused(story):
     with pytest.raises(ValueError, match="psm3"):
         story.world.command(Command({"psm3": ArmCommand()}))
