@@ -9,6 +9,7 @@ import typer
 
 from defras_bt.cli.errors import ExitCode, UserError
 from defras_bt.cli.files import find, folder_for
+from defras_bt.executive.proof.as_json import proof_json
 from defras_bt.executive.proof.prover import prove
 from defras_bt.executive.proof.report import proof_text
 from defras_bt.executive.tree_diff import tree_diff
@@ -67,6 +68,7 @@ def prove_tree(
         int | None,
         typer.Option(min=0, help="Prove it for a plan of this length; left out: for any length."),
     ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Answer in JSON.")] = False,
 ) -> None:
     """Prove that guards stop every motion in time. Example: defras tree prove defras
 
@@ -76,10 +78,13 @@ def prove_tree(
     file = find(tree, "trees")
     spec = read_tree(file, must_be_guarded=False)
     proof = prove(spec) if actions is None else prove(spec, (actions,))
-    typer.echo(proof_text(proof))
-    plans = "plans of any length" if actions is None else f"a plan of {actions} actions"
-    verdict = "is safe: proved" if proof.holds else "is not safe: looked at"
-    typer.echo(f"{file}: {spec.name} {verdict} from every state, for {plans}")
+    if as_json:
+        typer.echo(proof_json(proof, actions).model_dump_json(indent=2))
+    else:
+        typer.echo(proof_text(proof))
+        plans = "plans of any length" if actions is None else f"a plan of {actions} actions"
+        verdict = "is safe: proved" if proof.holds else "is not safe: looked at"
+        typer.echo(f"{file}: {spec.name} {verdict} from every state, for {plans}")
     if not proof.holds:
         raise typer.Exit(ExitCode.INVALID)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from defras_bt.executive.proof.as_json import ProofJson
 from defras_sim.resources import resource
 
 Defras = Callable[..., tuple[int, str, str]]
@@ -60,6 +61,22 @@ def test_prove_says_what_was_proved(defras: Defras) -> None:
     assert "fras is safe: proved from every state, for plans of any length" in out
     code, out, _ = defras("tree", "prove", "fras", "--actions", "20")
     assert (code, "for a plan of 20 actions" in out) == (0, True)
+
+
+def test_prove_answers_in_json(defras: Defras, unsafe: str) -> None:
+    code, out, _ = defras("tree", "prove", unsafe, "--json")
+    answer = ProofJson.model_validate_json(out)
+    assert (code, answer.holds, answer.plan_length) == (2, False, None)
+    refuted = {refutation.claim: refutation for refutation in answer.refuted}
+    assert {claim.name for claim in answer.claims if not claim.holds} == set(refuted)
+    at_fault = refuted["guards_first"].at_fault
+    assert (at_fault.kind, at_fault.file, at_fault.line) == ("sequence", unsafe, 3)
+    first, second = refuted["guards_first"].ticks
+    assert first.nodes["unsafe/sensors_fresh"].shows == "SUCCESS"
+    assert second.nodes["unsafe/sensors_fresh"].shows is None
+    code, out, _ = defras("tree", "prove", "let_go", "--json", "--actions", "2")
+    assert code == 0
+    assert ProofJson.model_validate_json(out).plan_length == 2
 
 
 def test_diff_calls_out_lost_guards(defras: Defras, tmp_path: Path) -> None:
