@@ -1,0 +1,77 @@
+"""The tree of a run as bare py_trees: the same inner nodes, leaves that say what was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import py_trees
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from defras_bt.executive.composites import PlanSlot
+from defras_bt.executive.loader import walk
+from defras_bt.executive.tree_file import read_tree
+from defras_bt.executive.tree_kinds import KINDS
+from defras_bt.executive.tree_spec import NodeSpec
+from defras_bt.recording.record import TickRecord
+
+
+class BareTree:
+    """Ticks through ``records``; nobody listens, nothing is looked at.
+
+    Each tick: :meth:`prepare`, :meth:`tick` (the one to measure), :meth:`check`.
+    """
+
+    def __init__(self, tree_file: Path, records: Sequence[TickRecord]) -> None:
+        self._records: Iterator[TickRecord] = iter(records)
+        root = _build(read_tree(tree_file).root)
+        self._bt = py_trees.trees.BehaviourTree(root)
+        slots = [(node, path) for node, path in walk(root) if isinstance(node, PlanSlot)]
+        self._slot: PlanSlot | None = slots[0][0] if slots else None
+        self._slot_path = slots[0][1] if slots else ""
+        self._plan: object = None
+        self._status: Mapping[str, str] = {}
+
+    def prepare(self) -> None:
+        """Put the next record's plan into the tree and its words into the leaves."""
+        record = next(self._records)
+        self._status = record.node_status
+        if record.plan is not self._plan and self._slot is not None:
+            self._plan = record.plan
+            above = f"{self._slot_path}/"
+            names = [p.removeprefix(above) for p in record.node_status if p.startswith(above)]
+            self._slot.fill([_Leaf(name) for name in names])
+        for node, path in walk(self._bt.root):
+            if isinstance(node, _Leaf):
+                said = self._status.get(path, "")
+                node.says = Status[said] if said else Status.INVALID
+
+    def tick(self) -> None:
+        self._bt.tick()
+
+    def check(self) -> None:
+        """Whether the root came to what it had come to.
+
+        Raises:
+            RuntimeError: it did not, so that times could not be compared.
+        """
+        root = self._bt.root
+        if root.status.name != self._status[root.name]:
+            raise RuntimeError(
+                f"the bare tree shows {root.status.name}, recorded is {self._status[root.name]}"
+            )
+
+
+class _Leaf(Behaviour):
+    says = Status.INVALID
+
+    def update(self) -> Status:
+        return self.says
+
+
+def _build(spec: NodeSpec) -> Behaviour:
+    if spec.node_class is not None:
+        return _Leaf(spec.name)
+    children = [_build(child) for child in spec.children]
+    return KINDS[spec.kind].build(spec.name, spec.options, children)
