@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from joblib import Parallel, delayed
 
 from defras_bt.benchmark.cases import Case, configurations, shipped
@@ -23,6 +24,7 @@ from defras_bt.planning.preoperative import (
 )
 from defras_bt.planning.preparation import needs_plan
 from defras_bt.planning.rehearsals import Progress, rehearse_all
+from defras_bt.planning.robust import sampled_beliefs
 from defras_bt.planning.scene_hash import scene_hash
 from defras_sim.resources import resource
 from defras_sim.scene import Scene
@@ -32,7 +34,13 @@ TREES = ("defras", "defras_paper", "fras")
 ORACLE = "oracle"
 """trees/defras.yaml with the actual attachments as its belief: what could be had at best."""
 
+ROBUST = "robust"
+"""trees/defras.yaml with a plan that was chosen over sampled sets of attachments."""
+
+SAMPLES = 8
+
 RUNS = (*TREES, ORACLE)
+ALL_RUNS = (*RUNS, ROBUST)
 
 
 @dataclass(frozen=True)
@@ -127,11 +135,12 @@ def _run(
     preparations: Preparations,
     seed: int,
 ) -> dict[str, Any]:
-    tree_file = resource(f"trees/{TREES[0] if run == ORACLE else run}.yaml")
+    tree_file = resource(f"trees/{run if run in TREES else TREES[0]}.yaml")
     threshold_n = believed.thresholds.force_n or 2 * preparations.force_median_n
     plan = None
     if needs_plan(read_tree(tree_file)):
-        plan = _plan(_in_world(believed, world), preparations).plan
+        samples = SAMPLES if run == ROBUST else 0
+        plan = _plan(_in_world(believed, world), preparations, samples, seed).plan
     operation = Operation(
         scene=believed,
         actual=actual,
@@ -151,13 +160,17 @@ def _run(
     return {**values, **force.values()}
 
 
-def _plan(scene: Scene, preparations: Preparations) -> PreoperativeResult:
+def _plan(scene: Scene, preparations: Preparations, samples: int, seed: int) -> PreoperativeResult:
     """The plan made before the operation; rehearsed now, if nobody did yet."""
     known = preparations.plans.get(scene_hash(scene))
-    if known is not None:
+    if known is not None and not samples:
         return known
-    executions = rehearse_all([scene], engine=Engine(jobs=1))[0]
-    return result_of(scene, executions, preparations.force_median_n)
+    around = sampled_beliefs(scene, samples, np.random.default_rng([seed, samples]))
+    if known is not None:
+        executions, elsewhere = known.executions, rehearse_all(around, engine=Engine(jobs=1))
+    else:
+        executions, *elsewhere = rehearse_all([scene, *around], engine=Engine(jobs=1))
+    return result_of(scene, executions, preparations.force_median_n, elsewhere)
 
 
 def _in_world(scene: Scene, world: str) -> Scene:

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 from pydantic import ValidationError
 from rich.console import Console
@@ -44,6 +45,10 @@ def plan(
         int, typer.Option(min=-1, help="Rehearsals side by side; -1: one per core.")
     ] = -1,
     engine: Annotated[str, typer.Option(help=f"Where to rehearse: {VALID}.")] = "local",
+    robust: Annotated[
+        int, typer.Option(min=0, help="Sets of attachments sampled around the belief.")
+    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the sampled sets.")] = 0,
     forbid: Annotated[
         str | None, typer.Option(help='Add a rule first, like "grasp psm1 point (2,3)".')
     ] = None,
@@ -58,6 +63,7 @@ def plan(
     Also derives the force threshold, twice the median of the largest forces of all rehearsals of
     all scenes given. With --out a search that was killed goes on where it was. A rule given with
     --forbid or --prefer is kept in the scene file, with its name and reason, for all later plans.
+    With --robust the retraction is chosen that works in most sets of attachments around the belief.
 
     Example: defras plan sim1 -o sim1.plan.json; defras run sim1 --plan sim1.plan.json
 
@@ -89,6 +95,8 @@ def plan(
                 engine=where,
                 journal=journal,
                 progress=report,
+                samples=robust,
+                rng=np.random.default_rng(seed),
             )
     except (EngineUnavailable, InvalidJournal) as error:
         raise UserError(str(error)) from error

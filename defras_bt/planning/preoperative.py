@@ -19,6 +19,7 @@ from defras_bt.planning.journal import Journal
 from defras_bt.planning.plan import ArmSituation, Plan, Situation
 from defras_bt.planning.planner import Planner
 from defras_bt.planning.rehearsals import STEP_M, Progress, rehearse_all
+from defras_bt.planning.robust import Robustness, choose_robust, sampled_beliefs
 from defras_bt.planning.scene_hash import scene_hash
 from defras_sim.retraction import arm_for
 from defras_sim.scene import Scene
@@ -33,7 +34,10 @@ class NothingToRetract(ValueError):
 
 @dataclass(frozen=True)
 class PreoperativeResult:
-    """What the rehearsals say. ``chosen`` is None where none qualified; ``reason`` says why."""
+    """What the rehearsals say. ``chosen`` is None where none qualified; ``reason`` says why.
+
+    ``robustness`` of the chosen one, where sampled sets of attachments were rehearsed too.
+    """
 
     scene: str
     scene_hash: str
@@ -43,6 +47,7 @@ class PreoperativeResult:
     chosen: Execution | None
     plan: Plan
     reason: str
+    robustness: Robustness | None = None
 
 
 def preoperative_plan(
@@ -71,30 +76,45 @@ def preoperative_plans(
     journal: Journal | None = None,
     progress: Progress | None = None,
     step_m: float = STEP_M,
+    samples: int = 0,
+    rng: np.random.Generator | None = None,
 ) -> list[PreoperativeResult]:
     """Rehearse all retractions of all ``scenes``; epsilon comes from all of them together.
 
     Without a retraction that qualifies, a scene's plan is the one that the ASP optimisation
-    prefers. A scene that states its own threshold keeps it.
+    prefers. A scene that states its own threshold keeps it. With ``samples``, that many sets of
+    attachments are drawn around each belief with ``rng``, and the retraction that works in most
+    of them is chosen; they do not count for epsilon.
 
     Raises:
+        ValueError: samples without a generator.
         NoPlan: no arm can reach any grasp point.
         NothingToRetract: a region is visible as things are.
     """
+    if samples and rng is None:
+        raise ValueError("drawing sets of attachments needs a random generator")
+    drawn = [sampled_beliefs(scene, samples, rng) if rng else [] for scene in scenes]
+    everything = [*scenes, *(scene for around in drawn for scene in around)]
     rehearsed = rehearse_all(
-        scenes, engine=engine, journal=journal, progress=progress, step_m=step_m
+        everything, engine=engine, journal=journal, progress=progress, step_m=step_m
     )
-    median_n = median_force_n([execution for of_scene in rehearsed for execution in of_scene])
+    believed, others = rehearsed[: len(scenes)], iter(rehearsed[len(scenes) :])
+    median_n = median_force_n([execution for of_scene in believed for execution in of_scene])
     return [
-        result_of(scene, executions, median_n)
-        for scene, executions in zip(scenes, rehearsed, strict=True)
+        result_of(scene, executions, median_n, [next(others) for _ in around])
+        for scene, executions, around in zip(scenes, believed, drawn, strict=True)
     ]
 
 
 def result_of(
-    scene: Scene, executions: tuple[Execution, ...], median_n: float
+    scene: Scene,
+    executions: tuple[Execution, ...],
+    median_n: float,
+    elsewhere: Sequence[Sequence[Execution]] = (),
 ) -> PreoperativeResult:
     """What the ``executions`` of ``scene`` say, where ``median_n`` is F_m.
+
+    ``elsewhere``: the executions with each sampled set of attachments.
 
     Raises:
         NoPlan: no arm can reach any grasp point.
@@ -107,7 +127,12 @@ def result_of(
         )
     limit_n = scene.thresholds.force_n or THRESHOLD_OVER_MEDIAN * median_n
     allowed = [execution for execution in executions if not forbidden(scene, execution)]
-    chosen = choose(allowed, scene.thresholds.roi_visibility, limit_n)
+    robust = None
+    if elsewhere:
+        found = choose_robust(allowed, elsewhere, scene.thresholds.roi_visibility, limit_n)
+        chosen, robust = found or (None, None)
+    else:
+        chosen = choose(allowed, scene.thresholds.roi_visibility, limit_n)
     planner, situation = Planner(scene), Situation({name: ArmSituation() for name in scene.arms})
     if chosen is None:
         plan = planner.plan(situation, scene.attached)
@@ -125,6 +150,8 @@ def result_of(
             f"{chosen.visibility:.0%} of the region with at most {chosen.force_max_n:.2f} N, "
             f"threshold {limit_n:.2f} N"
         )
+        if robust is not None:
+            reason += f"; {robust.sentence()}"
     return PreoperativeResult(
         scene=scene.name,
         scene_hash=scene_hash(scene),
@@ -134,6 +161,7 @@ def result_of(
         chosen=chosen,
         plan=plan,
         reason=reason,
+        robustness=robust,
     )
 
 
