@@ -17,7 +17,7 @@ from defras_sim.tissue.tetrahedra import FACES
 
 # Of a model with quadratic elements. The twin has to be solved many times a second; what imitates
 # reality has smaller elements, so that the twin's mesh is not the truth.
-UNKNOWNS: dict[MeshName, tuple[int, int]] = {"twin": (3000, 4600), "actual": (5500, 8500)}
+UNKNOWNS: dict[MeshName, tuple[int, int]] = {"twin": (4500, 5600), "actual": (7500, 10500)}
 
 
 def built(tissue: Solid | Sheet, file: Path, tell: Callable[[str], None]) -> Anatomy:

@@ -122,7 +122,9 @@ def _rim(sheet: Sheet, edge_m: float) -> Floats:
     middle = start[:-1] + start[-1]
     after = np.interp(middle + 0.25 * edge_m, ways, around)
     turn = np.abs(after - np.interp(middle - 0.25 * edge_m, ways, around))
-    corners = _peaks(turn, start[:-1], start[-1], edge_m)
+    # Of the vertices around a corner, the one that turns most is the corner.
+    own = np.abs(heading - np.roll(heading, 1) + np.where(np.arange(len(heading)), 0, 2 * np.pi))
+    corners = _peaks(turn, own, start[:-1], start[-1], edge_m)
     stops = np.array([*corners, corners[0] + start[-1]]) if len(corners) else start[[0, -1]]
     pieces = []
     for begin, end in pairwise(stops):
@@ -133,12 +135,12 @@ def _rim(sheet: Sheet, edge_m: float) -> Floats:
     return np.stack([np.interp(places, start, closed[:, k]) for k in range(2)], axis=1)
 
 
-def _peaks(turn: Floats, at_m: Floats, around_m: float, edge_m: float) -> list[float]:
+def _peaks(turn: Floats, own: Floats, at_m: Floats, around_m: float, edge_m: float) -> list[float]:
     """Where the rim turns sharply: the sharpest first, none within an edge of another."""
     chosen: list[float] = []
-    for number in np.argsort(-turn):
+    for number in np.argsort(-turn - own):
         if turn[number] < _CORNER_RAD:
-            break
+            continue
         here = at_m[number]
         away = [min(abs(here - other), around_m - abs(here - other)) for other in chosen]
         if min(away, default=np.inf) > edge_m:
