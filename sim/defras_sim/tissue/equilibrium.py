@@ -63,6 +63,12 @@ class PotentialEnergy:
             gradient += slope
         return energy, gradient
 
+    def tangent_of(self, name: str, positions_m: Floats) -> sparse.csc_array:
+        """The second derivative of one term alone, in the sparsity of the whole."""
+        entries = np.zeros(self._layout.pattern.nnz)
+        self.terms[name].add_tangent(positions_m, self._places[name], entries)
+        return self._layout.matrix(entries)
+
     def tangent(self, positions_m: Floats) -> sparse.csc_array:
         """Second derivative (3 nodes, 3 nodes) [N/m], symmetric."""
         entries = np.zeros(self._layout.pattern.nnz)

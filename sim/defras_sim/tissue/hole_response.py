@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
 
 from defras_sim.geometry import Floats
 from defras_sim.tissue.discs import ROWS
@@ -40,17 +39,18 @@ def hole_response(
     """The response at the equilibrium ``positions_m`` (nodes, 3), where ``solve`` belongs to."""
     chosen = np.asarray(holes, dtype=np.int64)
     rows = (ROWS * chosen[:, None] + np.arange(ROWS)).ravel()
-    on_mesh = attachments.springs.rows[rows].toarray()
+    on_mesh = attachments.springs.rows[rows]
     pulls = attachments.pulls(positions_m)
     # What a force on the held tissue leaves for the mesh after the dent has taken its share.
-    reaching = linalg.block_diag(*pulls.passed_on[rows])
-    in_dents = linalg.block_diag(*pulls.held_by_force[rows])
-    by_node = solve(np.kron(on_mesh.T, np.eye(3)) @ reaching)
-    on_holes = reaching @ np.kron(on_mesh, np.eye(3)) @ by_node + in_dents
-    on_surface = surface.from_nodes @ by_node.reshape(len(positions_m), -1)
-    count, size = len(chosen), 3 * ROWS
+    reaching = pulls.passed_on[rows]
+    nodes, count, size = len(positions_m), len(chosen), 3 * ROWS
+    forces = np.einsum("rn,rij->nirj", on_mesh.toarray(), reaching)
+    by_node = solve(forces.reshape(3 * nodes, -1)).reshape(nodes, -1)
+    held = reaching @ (on_mesh @ by_node).reshape(len(rows), 3, -1)
+    each = np.arange(len(rows))
+    held.reshape(len(rows), 3, len(rows), 3)[each, :, each] += pulls.held_by_force[rows]
     return HoleResponse(
-        on_surface.reshape(-1, 3, count, size),
-        on_holes.reshape(count, size, count, size),
+        (surface.from_nodes @ by_node).reshape(-1, 3, count, size),
+        held.reshape(count, size, count, size),
         (pulls.held_m - attachments.targets_m)[rows].reshape(count, size),
     )

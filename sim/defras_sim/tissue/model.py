@@ -22,7 +22,7 @@ from defras_sim.tissue.holes import Holes
 from defras_sim.tissue.loads import gravity
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import Integers
-from defras_sim.tissue.parameters import Parameter
+from defras_sim.tissue.parameters import Balance, Parameter
 from defras_sim.tissue.path import length_m
 from defras_sim.tissue.readout import tissue_state
 from defras_sim.tissue.response import LinearResponse
@@ -270,9 +270,7 @@ class TissueModel:
                 f"({np.linalg.norm(gradient):.2g} N are unbalanced)"
             )
         return sensitivities(
-            self._energy,
-            self._grasps,
-            self._positions_m,
+            Balance(self._energy, self._grasps, self._positions_m),
             self._surface,
             self._response.at(self._energy, self._positions_m),
             parameters,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from defras_sim.tissue.discs import ROWS
 from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.grasp import Grasp, term_name
 from defras_sim.tissue.holes import TERM_NAME as ATTACHMENTS
-from defras_sim.tissue.springs import SpringTerm
+from defras_sim.tissue.springs import Pulls, SpringTerm
+from defras_sim.tissue.terms import unknown_parameter
 
 
 @dataclass(frozen=True)
@@ -47,77 +48,86 @@ Parameter = TermParameter | HoleStiffness | TipMotion
 
 
 @dataclass(frozen=True)
-class Change:
-    """What a parameter changes at fixed positions: the gradient (nodes, 3, columns).
+class Balance:
+    """An equilibrium to be differentiated: ``positions_m`` (nodes, 3) of ``energy``, whose arms
+    hold with ``grasps``."""
 
-    Where it does so through the springs of ``spring_term``, ``spring_forces_by`` (rows, 3, columns)
-    are the changes of their forces.
-    """
+    energy: PotentialEnergy
+    grasps: Mapping[str, Grasp]
+    positions_m: Floats
+    _pulls: dict[str, Pulls] = field(default_factory=dict)
+
+    def springs(self, name: str) -> SpringTerm:
+        """The term called ``name``, which consists of springs.
+
+        Raises:
+            TypeError: it is another kind of term.
+        """
+        term = self.energy.terms[name]
+        if not isinstance(term, SpringTerm):
+            raise TypeError(f"term {name!r} should consist of springs, is a {type(term).__name__}")
+        return term
+
+    def pulls(self, name: str) -> Pulls:
+        """What the springs of the term called ``name`` do; found out once."""
+        if name not in self._pulls:
+            self._pulls[name] = self.springs(name).pulls(self.positions_m)
+        return self._pulls[name]
+
+
+@dataclass(frozen=True)
+class GradientChange:
+    """A parameter changes the gradient (nodes, 3) at fixed positions."""
 
     gradient_by: Floats
-    spring_term: str | None = None
-    spring_forces_by: Floats | None = None
+    term: str
+    columns: int = 1
+
+
+@dataclass(frozen=True)
+class SpringChange:
+    """A parameter changes the forces (rows, 3, columns) of a term's springs at fixed positions."""
+
+    forces_by: Floats
+    term: str
 
     @property
     def columns(self) -> int:
-        return self.gradient_by.shape[2]
+        return self.forces_by.shape[2]
 
 
-def change_of(
-    parameter: Parameter,
-    energy: PotentialEnergy,
-    grasps: Mapping[str, Grasp],
-    positions_m: Floats,
-) -> Change:
-    """What ``parameter`` changes in ``energy``, whose arms hold with ``grasps``.
+def change_of(parameter: Parameter, balance: Balance) -> GradientChange | SpringChange:
+    """What ``parameter`` changes.
 
     Raises:
         ValueError: there is no such term, parameter, hole or holding arm.
     """
     if isinstance(parameter, TipMotion):
-        grasp = grasps.get(parameter.arm)
+        grasp = balance.grasps.get(parameter.arm)
         if grasp is None:
             raise ValueError(
                 f"{parameter.arm} holds no tissue, so its tip moves nothing; holding: "
-                f"{', '.join(grasps) or 'none'}"
+                f"{', '.join(balance.grasps) or 'none'}"
             )
-        held_by = spring_term(energy, term_name(parameter.arm))
-        return _through_springs(
-            held_by, held_by.pulls(positions_m).stiffness_n_per_m @ grasp.targets_by_tip_m()
-        )
+        name = term_name(parameter.arm)
+        stiffness = balance.pulls(name).stiffness_n_per_m
+        return SpringChange(stiffness @ grasp.targets_by_tip_m(), name)
     if isinstance(parameter, HoleStiffness):
-        held = spring_term(energy, ATTACHMENTS)
-        holes = len(held.targets_m) // ROWS
+        by_stiffness = balance.pulls(ATTACHMENTS).forces_by_stiffness
+        holes = len(by_stiffness) // ROWS
         if not 0 <= parameter.hole < holes:
             raise ValueError(f"there is no hole {parameter.hole}; holes are 0 to {holes - 1}")
-        pull = np.zeros((len(held.targets_m), 3, 1))
         rows = slice(ROWS * parameter.hole, ROWS * (parameter.hole + 1))
-        pull[rows, :, 0] = held.pulls(positions_m).forces_by_stiffness[rows]
-        return _through_springs(held, pull)
-    term = energy.terms.get(parameter.term)
+        forces = np.zeros((len(by_stiffness), 3, 1))
+        forces[rows, :, 0] = by_stiffness[rows]
+        return SpringChange(forces, ATTACHMENTS)
+    term = balance.energy.terms.get(parameter.term)
     if term is None:
-        raise ValueError(f"there is no term {parameter.term!r}; terms: {', '.join(energy.terms)}")
-    gradient_by = term.gradient_by(parameter.parameter, positions_m)[:, :, None]
+        known = ", ".join(balance.energy.terms)
+        raise ValueError(f"there is no term {parameter.term!r}; terms: {known}")
     if isinstance(term, SpringTerm):
-        return Change(gradient_by, term.name, term.forces_by_scale_n(positions_m)[:, :, None])
-    return Change(gradient_by)
-
-
-def spring_term(energy: PotentialEnergy, name: str) -> SpringTerm:
-    """The term called ``name``, which consists of springs.
-
-    Raises:
-        TypeError: it is another kind of term.
-    """
-    term = energy.terms[name]
-    if not isinstance(term, SpringTerm):
-        raise TypeError(f"term {name!r} should consist of springs, is a {type(term).__name__}")
-    return term
-
-
-def _through_springs(term: SpringTerm, forces_by: Floats) -> Change:
-    """Springs that pull more have that much less of a gradient."""
-    rows = term.springs.rows
-    by_node = rows.T @ forces_by.reshape(len(forces_by), -1)
-    gradient_by = -by_node.reshape(rows.shape[1], 3, forces_by.shape[2])
-    return Change(gradient_by, term.name, forces_by)
+        if parameter.parameter not in term.parameters:
+            raise unknown_parameter(term, parameter.parameter)
+        return SpringChange(term.forces_by_scale_n(balance.positions_m)[:, :, None], term.name)
+    gradient_by = term.gradient_by(parameter.parameter, balance.positions_m)
+    return GradientChange(gradient_by, term.name)

@@ -15,20 +15,20 @@ from scipy import sparse
 
 from defras_sim.geometry import Floats
 from defras_sim.tissue.discs import ROWS
-from defras_sim.tissue.equilibrium import PotentialEnergy
-from defras_sim.tissue.grasp import Grasp
+from defras_sim.tissue.grasp import term_name
 from defras_sim.tissue.holes import TERM_NAME as ATTACHMENTS
 from defras_sim.tissue.parameters import (
-    Change,
+    Balance,
+    GradientChange,
     Parameter,
-    TermParameter,
+    SpringChange,
     TipMotion,
     change_of,
-    spring_term,
 )
 from defras_sim.tissue.response import Solve
-from defras_sim.tissue.springs import SpringTerm
 from defras_sim.tissue.surface import SurfaceMap
+
+Change = GradientChange | SpringChange
 
 BED = "bed"
 
@@ -54,92 +54,93 @@ class Sensitivities:
 
 
 def sensitivities(
-    energy: PotentialEnergy,
-    grasps: Mapping[str, Grasp],
-    positions_m: Floats,
-    surface: SurfaceMap,
-    solve: Solve,
-    parameters: Sequence[Parameter],
+    balance: Balance, surface: SurfaceMap, solve: Solve, parameters: Sequence[Parameter]
 ) -> Sensitivities:
-    """Derivatives at the equilibrium ``positions_m`` (nodes, 3) of ``energy``.
+    """Derivatives at an equilibrium; ``solve`` gives its linear response to nodal forces.
 
     Raises:
         ValueError: a parameter does not exist, or is given twice.
     """
-    changes: dict[Parameter, Change] = {}
-    columns: dict[Parameter, slice] = {}
-    size = 0
-    for parameter in parameters:
-        if parameter in changes:
-            raise ValueError(f"{parameter} is given twice")
-        change = change_of(parameter, energy, grasps, positions_m)
-        changes[parameter] = change
-        columns[parameter] = slice(size, size + change.columns)
-        size += change.columns
-    right, bed_by = np.zeros((2, *positions_m.shape, size))
+    changes = {parameter: change_of(parameter, balance) for parameter in parameters}
+    if len(changes) < len(parameters):
+        twice = next(p for i, p in enumerate(parameters) if p in parameters[:i])
+        raise ValueError(f"{twice} is given twice")
+    columns = _columns(changes)
+    size = sum(change.columns for change in changes.values())
+    nodes = balance.positions_m.shape
+    right, bed_by = np.zeros((*nodes, size)), np.zeros((*nodes, size))
+    explicit: dict[str, Floats] = {}
     for parameter, change in changes.items():
-        right[:, :, columns[parameter]] = -change.gradient_by
-        if isinstance(parameter, TermParameter) and parameter.term == BED:
-            bed_by[:, :, columns[parameter]] = change.gradient_by
+        where = columns[parameter]
+        if isinstance(change, SpringChange):
+            shape = (len(change.forces_by), 3, size)
+            explicit.setdefault(change.term, np.zeros(shape))[:, :, where] = change.forces_by
+        else:
+            right[:, :, where] = -change.gradient_by[:, :, None]
+            if change.term == BED:
+                bed_by[:, :, where] = change.gradient_by[:, :, None]
+    for name, pulled in explicit.items():
+        right += _applied(sparse.csr_array(balance.springs(name).springs.rows.T), pulled)
     nodes_by = solve(right.reshape(-1, size)).reshape(right.shape)
 
-    def forces_by(term: SpringTerm) -> Floats:
-        by = -term.pulls(positions_m).stiffness_n_per_m @ _applied(term.springs.rows, nodes_by)
-        for parameter, change in changes.items():
-            if change.spring_term == term.name and change.spring_forces_by is not None:
-                by[:, :, columns[parameter]] += change.spring_forces_by
-        return by
+    def forces_by(name: str) -> Floats:
+        moved = _applied(balance.springs(name).springs.rows, nodes_by)
+        by = -balance.pulls(name).stiffness_n_per_m @ moved
+        return by + explicit[name] if name in explicit else by
 
-    grasp_forces_by, grasp_moments_by = {}, {}
-    for arm, grasp in grasps.items():
-        by = forces_by(grasp.term(arm))
-        tip_by = np.zeros((3, size))
-        if TipMotion(arm) in columns:
-            first = columns[TipMotion(arm)].start
-            tip_by[:, first : first + 3] = np.eye(3)
-        grasp_forces_by[arm] = np.einsum("r,rik->ik", grasp.shifts, by)
-        grasp_moments_by[arm] = _moment_by(arm, grasp, positions_m, nodes_by, tip_by, by)
+    forces = {arm: forces_by(term_name(arm)) for arm in balance.grasps}
     return Sensitivities(
         columns,
         nodes_by,
         _applied(surface.from_nodes, nodes_by),
-        grasp_forces_by,
-        grasp_moments_by,
-        forces_by(spring_term(energy, ATTACHMENTS))[::ROWS],
-        _bed_force_by(energy, positions_m, nodes_by, bed_by),
+        {arm: np.einsum("r,rik->ik", balance.grasps[arm].shifts, by) for arm, by in forces.items()},
+        {arm: _moment_by(arm, balance, nodes_by, columns, by) for arm, by in forces.items()},
+        forces_by(ATTACHMENTS)[::ROWS],
+        _bed_force_by(balance, nodes_by, bed_by),
     )
+
+
+def _columns(changes: Mapping[Parameter, Change]) -> dict[Parameter, slice]:
+    columns, first = {}, 0
+    for parameter, change in changes.items():
+        columns[parameter] = slice(first, first + change.columns)
+        first += change.columns
+    return columns
 
 
 def _moment_by(
     arm: str,
-    grasp: Grasp,
-    positions_m: Floats,
+    balance: Balance,
     nodes_by: Floats,
-    tip_by: Floats,
+    columns: Mapping[Parameter, slice],
     forces_by: Floats,
 ) -> Floats:
-    """Derivative (3, columns) of a grasp's moment about its tip, which moves by ``tip_by``."""
+    """Derivative (3, columns) of a grasp's moment about its tip, which may itself move."""
+    grasp = balance.grasps[arm]
     rows, shifts = grasp.springs.rows, grasp.shifts
-    levers_m = rows @ positions_m - np.outer(shifts, grasp.tissue_from_tip.position_m)
+    tip_by = np.zeros(nodes_by.shape[1:])
+    if TipMotion(arm) in columns:
+        first = columns[TipMotion(arm)].start
+        tip_by[:, first : first + 3] = np.eye(3)
+    levers_m = rows @ balance.positions_m - np.outer(shifts, grasp.tissue_from_tip.position_m)
     levers_by = _applied(rows, nodes_by) - shifts[:, None, None] * tip_by
-    forces_n = grasp.term(arm).forces_n(positions_m)
+    forces_n = balance.pulls(term_name(arm)).forces_n
     turned = np.cross(levers_by, forces_n[:, :, None], axis=1)
     pulled = np.cross(levers_m[:, :, None], forces_by, axis=1)
     return (turned + pulled).sum(axis=0)
 
 
-def _bed_force_by(
-    energy: PotentialEnergy, positions_m: Floats, nodes_by: Floats, gradient_by: Floats
-) -> Floats:
+def _bed_force_by(balance: Balance, nodes_by: Floats, gradient_by: Floats) -> Floats:
     """Derivative (3, columns); ``gradient_by`` (nodes, 3, columns) is the bed's own, explicitly."""
-    bed = energy.terms.get(BED)
-    if bed is None:
+    if BED not in balance.energy.terms:
         return np.zeros(nodes_by.shape[1:])
-    tangent = PotentialEnergy(len(positions_m), [bed]).tangent(positions_m)
-    moved = (tangent @ nodes_by.reshape(-1, nodes_by.shape[2])).reshape(nodes_by.shape)
-    return -(moved + gradient_by).sum(axis=0)
+    tangent = balance.energy.tangent_of(BED, balance.positions_m)
+    # The sum over the nodes first: three rows serve all columns.
+    summed = np.tile(np.eye(3), len(nodes_by)) @ tangent
+    return -(summed @ nodes_by.reshape(-1, nodes_by.shape[2]) + gradient_by.sum(axis=0))
 
 
 def _applied(rows: sparse.csr_array, nodes_by: Floats) -> Floats:
     """Derivatives (rows, 3, columns) of weighted means of positions from those of the nodes."""
-    return (rows @ nodes_by.reshape(len(nodes_by), -1)).reshape(-1, *nodes_by.shape[1:])
+    means = np.asarray(rows @ nodes_by.reshape(len(nodes_by), -1), dtype=float)
+    return means.reshape(-1, *nodes_by.shape[1:])
