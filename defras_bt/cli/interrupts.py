@@ -9,10 +9,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_REASONS = {
-    signal.SIGINT: "the operator asked to stop",
-    signal.SIGTERM: "the system asked to stop",
-    signal.SIGHUP: "the terminal was closed",
+from defras_bt.executive.operator_desk import OperatorDesk
+from defras_bt.recording.operator_state import Act
+
+_SOURCES = {
+    signal.SIGINT: ("Ctrl-C", ""),
+    signal.SIGTERM: ("system", "the system asked to stop"),
+    signal.SIGHUP: ("terminal", "the terminal was closed"),
 }
 _FINISHING = "\nThe arms are still. The recordings are being finished; please wait.\n"
 
@@ -25,20 +28,17 @@ class Interrupts:
     ignored when the program started (as under nohup) stays so.
     """
 
-    def __init__(self) -> None:
-        self._asked: str | None = None
+    def __init__(self, desk: OperatorDesk) -> None:
+        self._desk = desk
+        self._asked = False
         self._ended = False
-
-    def operator_stop(self) -> str | None:
-        """Why to stop; None while nobody asked."""
-        return self._asked
 
     @contextmanager
     def heeded(self) -> Iterator[Interrupts]:
         """While operating: whoever interrupts is heard by the executive."""
         before = {
             number: signal.signal(number, self._on_interrupt)
-            for number in _REASONS
+            for number in _SOURCES
             if signal.getsignal(number) is not signal.SIG_IGN
         }
         try:
@@ -57,8 +57,10 @@ class Interrupts:
         if self._ended:
             # Printing could fall into the middle of a print that was interrupted.
             os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, _FINISHING.encode())
-        elif self._asked is None:
-            self._asked = _REASONS[signal.Signals(number)]
+        elif not self._asked:
+            self._asked = True
+            source, words = _SOURCES[signal.Signals(number)]
+            self._desk.request(Act.STOP, source, words)
         else:
             self._ended = True
             raise KeyboardInterrupt

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
+from defras_bt.cli.at_the_desk import at_the_desk
 from defras_bt.cli.errors import OUTCOME_CODES, ExitCode, UserError
 from defras_bt.cli.files import find, find_scene, folder_for
 from defras_bt.cli.interrupts import Interrupts
 from defras_bt.cli.plan import rehearsed, tell
 from defras_bt.executive.deadline import interrupting
 from defras_bt.executive.operation import WORLDS, Operation, operate
+from defras_bt.executive.operator_desk import OperatorDesk
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, read_substitutes
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.faults.faults import NO_FAULTS, FaultInjection
 from defras_bt.faults.file import read_faults
-from defras_bt.planning.english import plan_text
-from defras_bt.planning.plan import Plan
 from defras_bt.planning.preparation import needs_plan
 from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.composite import RecordingFailed
@@ -57,13 +55,17 @@ def run(
     faults: Annotated[
         str | None, typer.Option(help="Faults to inject: a file, or a shipped name.")
     ] = None,
-    approve: Annotated[bool, typer.Option("--approve", help="Ask before each plan.")] = False,
+    approve: Annotated[
+        bool, typer.Option("--approve", help="Show each plan and wait for the operator's approval.")
+    ] = False,
 ) -> None:
     """Retract the tissue until the region of interest is visible.
 
     Leaves run.rrd, recording.mcap, decisions.jsonl, run.json and report.html in --out. Exit code:
     0 goal reached, 2 invalid input, 3 goal not reached, 4 a human was asked, 1 internal error, or
     goal reached but not everything could be recorded. Ctrl-C stops the arms and asks a human.
+
+    While it runs, keys and "defras operator" pause, resume, stop, take over and hand back.
 
     Example: defras run demo --actual demo_actual --world bullet --out out/demo
     """
@@ -114,14 +116,14 @@ def run(
             f"A TRIAL, NOT AN OPERATION: faults are injected ({kinds}).", style="bold yellow"
         )
     recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console), *recorded]
-    asked: Callable[[Plan], bool] = _ask if approve else lambda plan: True
+    desk = OperatorDesk(asks=approve, idle_s=believed.tick_s)
+    interrupts = Interrupts(desk)
     try:
-        with Interrupts().heeded() as interrupts:
+        with at_the_desk(desk, console, out, asks=approve), interrupts.heeded():
             summary = operate(
                 operation,
                 recorders,
-                approve=asked,
-                operator_stop=interrupts.operator_stop,
+                operator=desk,
                 faults=FaultInjection(injected, believed, seed),
                 deadline=interrupting(LONGEST_TICK_S),
                 finishing=interrupts.finishing,
@@ -182,17 +184,3 @@ def _require_same_set_up(believed: Scene, truth: Scene) -> None:
                 f"{believed.name} and {truth.name} differ in {key}; an actual scene may differ "
                 "from the believed one in the patient, not in the set-up"
             )
-
-
-def _ask(plan: Plan) -> bool:
-    """Whether the operator approves. No answer (Ctrl-C, end of input) is no approval."""
-    typer.echo(plan_text(plan, reasons=True))
-    # At the prompt the first Ctrl-C has to end the waiting, not to be noted for the next tick.
-    while_operating = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        return typer.confirm("Carry out this plan?", default=False)
-    except typer.Abort:
-        typer.echo()
-        return False
-    finally:
-        signal.signal(signal.SIGINT, while_operating)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from defras_bt.executive.ports import PortValues
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import GridPoint, Plan
+from defras_bt.recording.operator_state import NOBODY, OperatorState
 from defras_bt.recording.record import Cause, Event, Level
 from defras_sim.geometry import Floats, Pose
 from defras_sim.tissue.state import TissueState
@@ -39,7 +40,7 @@ class TickInputs:
     force_n: float
     force_threshold_n: float
     reading: MonitorReading | None
-    operator_stop: str | None = None
+    operator: OperatorState = NOBODY
     force_over_s: float = 0.0
 
 
@@ -85,6 +86,7 @@ class Blackboard:
     events: list[Event] = field(default_factory=list)
     failure: Cause | None = None
     ports: PortValues = field(default_factory=PortValues)
+    awaits_approval: bool = False
 
     plan: Plan | None = None
     new_plan: Plan | None = None
@@ -111,6 +113,7 @@ class Blackboard:
         self.rate = 1.0
         self.events = []
         self.failure = None
+        self.awaits_approval = False
 
     def move(self, arm: str, command: ArmCommand) -> None:
         """Propose motion for one arm; the gate has the last word."""

@@ -59,7 +59,11 @@ Rehearse = Callable[[Scene, GridPoint, Sequence[str]], Rehearsal]
 
 @dataclass(frozen=True)
 class Context:
-    """Services of one executive. ``approve`` asks the operator before a plan is carried out."""
+    """Services of one executive.
+
+    ``approve`` asks the operator before a plan is carried out: None means not answered yet, ask
+    again in the next tick.
+    """
 
     board: Blackboard
     twin: TwinService
@@ -70,7 +74,7 @@ class Context:
     rehearse: Rehearse
     rng: np.random.Generator
     preoperative: Plan | None = None
-    approve: Callable[[Plan], bool] = field(default=lambda plan: True)
+    approve: Callable[[Plan], bool | None] = field(default=lambda plan: True)
 
     @property
     def scene(self) -> Scene:

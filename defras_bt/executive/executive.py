@@ -15,6 +15,7 @@ from defras_bt.executive.blackboard import Blackboard, TickInputs
 from defras_bt.executive.context import Context
 from defras_bt.executive.deadline import Deadline
 from defras_bt.executive.gate import CommandGate, GateVerdict, Proposal
+from defras_bt.executive.handover import Handover
 from defras_bt.executive.loader import LoadedTree, build_tree
 from defras_bt.executive.perception import Perception
 from defras_bt.executive.reasons import Code
@@ -22,6 +23,7 @@ from defras_bt.executive.statuses import TickedVisitor
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.executive.why import WhyTeller
+from defras_bt.recording.operator_state import UNATTENDED, Operator
 from defras_bt.recording.record import Event, Recorder, TickRecord
 from defras_sim.worlds.protocol import HOLD, Command, World
 
@@ -50,6 +52,7 @@ class Executive:
         max_time_s: float,
         deadline: Deadline = nullcontext,
         substitutes: Substitutes = NOTHING_SUBSTITUTED,
+        operator: Operator = UNATTENDED,
     ) -> None:
         self._context = context
         self._board: Blackboard = context.board
@@ -68,6 +71,9 @@ class Executive:
         self._visitors: list[VisitorBase] = [self._ticked, self._actions]
         self._gate = CommandGate(context.scene, self.tree.metric)
         self._why = WhyTeller()
+        self._operator = operator
+        self._handover = Handover(self._board, self.tree.plan_slot)
+        self._held_s = 0.0
         self._tick = 0
         self._state_before = 0
         self._over_before = False
@@ -114,14 +120,18 @@ class Executive:
     def tick(self) -> None:
         """One tick, without the care that :meth:`run` takes of exceptions."""
         board = self._board
-        inputs = self._perception.update(self._tick, self._world.observe())
+        operator = self._operator.state()
+        inputs = self._perception.update(self._tick, self._world.observe(), operator)
         board.begin_tick(inputs)
+        self._handover.update()
         if self._tick == 0 and self.substituted:
             self._tell_substituted()
         self._tell_changes(inputs)
         with self._deadline():
             self._tick_tree()
-        if inputs.time_s >= self._max_time_s and board.outcome is None:
+        if board.awaits_approval or operator.holds:
+            self._held_s += self._context.scene.tick_s
+        if inputs.time_s - self._held_s >= self._max_time_s and board.outcome is None:
             board.tell("end", f"Stopped after {inputs.time_s:.0f} s without the goal.", "error")
             why = f"time is over after {inputs.time_s:.0f} s"
             board.end("not_reached", why, Code.TIME_OVER)
@@ -133,6 +143,7 @@ class Executive:
         self._record(inputs, sent)
         self._splice()
         self._tick += 1
+        self._operator.idle()
         self._world.step()
 
     def _tick_tree(self) -> None:
@@ -245,10 +256,10 @@ class Executive:
             node_last_status=snapshot.last_status,
             node_code=snapshot.code,
             node_decider=snapshot.decider,
-            operator_stop=inputs.operator_stop,
             cause=snapshot.cause,
             stopped_by=snapshot.stopped_by,
             ended=board.outcome_cause,
+            operator=inputs.operator,
             plan=board.plan,
             plan_step=slot.step if slot is not None else None,
             events=tuple(board.events),

@@ -174,7 +174,7 @@ class CommandGate:
 
 def _blindness(inputs: TickInputs) -> list[str]:
     """Reasons to touch nothing, jaws included."""
-    return [stop for stop in (*inputs.missing, inputs.operator_stop) if stop]
+    return [stop for stop in (*inputs.missing, inputs.operator.forbids) if stop]
 
 
 def _ownerless(proposed: Proposal) -> list[str]:

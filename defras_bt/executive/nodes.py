@@ -8,6 +8,7 @@ from py_trees.common import Status
 from pydantic import Field
 
 from defras_bt.executive.node import Node, NodeParameters, Role
+from defras_bt.executive.operator_nodes import HOLDING_CODES
 from defras_bt.executive.reasons import Code, Remedy, helps
 from defras_bt.executive.registry import register_node
 from defras_bt.recording.record import Cause
@@ -116,8 +117,9 @@ class AskHuman(Task):
 
     def _why(self) -> Cause:
         board = self.context.board
-        if board.inputs.operator_stop:
-            return Cause(Code.STOPPED, board.inputs.operator_stop)
+        operator = board.inputs.operator
+        if operator.forbids is not None:
+            return Cause(HOLDING_CODES.get(operator.mode, Code.STOPPED), operator.forbids)
         if board.operator_refused:
             return Cause(Code.PLAN_REFUSED, board.operator_refused)
         if board.inputs.missing:

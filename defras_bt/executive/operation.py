@@ -23,6 +23,7 @@ from defras_bt.learning.inverse import InverseEstimator
 from defras_bt.monitoring.warning import WarningMonitor
 from defras_bt.planning.plan import Plan
 from defras_bt.recording.composite import CompositeRecorder
+from defras_bt.recording.operator_state import UNATTENDED, Operator
 from defras_bt.recording.record import Recorder, RunInfo, RunSummary
 from defras_bt.recording.summary import SummaryRecorder
 from defras_bt.recording.versions import versions
@@ -73,16 +74,16 @@ def operate(
     operation: Operation,
     recorders: Sequence[Recorder] = (),
     *,
-    approve: Callable[[Plan], bool] = lambda plan: True,
-    operator_stop: Callable[[], str | None] = lambda: None,
+    operator: Operator = UNATTENDED,
     faults: FaultInjection | None = None,
     deadline: Deadline = nullcontext,
     finishing: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> RunSummary:
     """Run the operation to its outcome; every recorder is finished whatever happens.
 
-    ``faults`` go wrong on the way. ``deadline`` limits how long a tick may take on the wall.
-    ``finishing`` surrounds the finishing of the recorders, which nobody should interrupt.
+    ``operator`` is asked every tick. ``faults`` go wrong on the way. ``deadline`` limits how long a
+    tick may take on the wall. ``finishing`` surrounds the finishing of the recorders, which nobody
+    should interrupt.
 
     Raises:
         ValueError: nodes are substituted in a world that is not simulated.
@@ -99,8 +100,7 @@ def operate(
         replace(operation, scene=believed),
         learning_rng,
         recorders,
-        approve=approve,
-        operator_stop=operator_stop,
+        operator=operator,
         faults=faults,
         deadline=deadline,
         finishing=finishing,
@@ -113,8 +113,7 @@ def operate_in(
     learning_rng: np.random.Generator,
     recorders: Sequence[Recorder] = (),
     *,
-    approve: Callable[[Plan], bool] = lambda plan: True,
-    operator_stop: Callable[[], str | None] = lambda: None,
+    operator: Operator = UNATTENDED,
     faults: FaultInjection | None = None,
     deadline: Deadline = nullcontext,
     finishing: Callable[[], AbstractContextManager[None]] = nullcontext,
@@ -144,11 +143,9 @@ def operate_in(
             rehearse=TwinRehearsal(),
             rng=learning_rng,
             preoperative=operation.preoperative,
-            approve=approve,
+            approve=operator.approve,
         )
-        perception = Perception(
-            board, twin, monitor, keyframes, operation.force_threshold_n, operator_stop
-        )
+        perception = Perception(board, twin, monitor, keyframes, operation.force_threshold_n)
         executive = Executive(
             operation.tree_file,
             context,
@@ -158,6 +155,7 @@ def operate_in(
             operation.max_time_s,
             deadline,
             substitutes=operation.substitutes,
+            operator=operator,
         )
         breaker = injected.breaker()
         if breaker is not None:

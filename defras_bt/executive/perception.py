@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from defras_bt.executive.grips import GripTracker
 from defras_bt.learning.buffer import KeyframeBuffer
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.monitoring.warning import WarningMonitor
+from defras_bt.recording.operator_state import NOBODY, OperatorState
 from defras_bt.sensing.arms import ArmPlausibility
 from defras_bt.sensing.freshness import stale
 from defras_bt.sensing.latest import LatestReadings
@@ -30,28 +31,27 @@ class Perception:
         monitor: WarningMonitor,
         keyframes: KeyframeBuffer,
         force_threshold_n: float,
-        operator_stop: Callable[[], str | None],
     ) -> None:
         self._board = board
         self._twin = twin
         self._monitor = monitor
         self._keyframes = keyframes
         self._force_threshold_n = force_threshold_n
-        self._operator_stop = operator_stop
         self._grips = GripTracker(board, twin)
         self._touched = False
         self._latest = LatestReadings(twin.scene)
         self._arms = ArmPlausibility(twin.scene)
         self._time_s = -np.inf
 
-    def update(self, tick: int, observation: Observation) -> TickInputs:
+    def update(
+        self, tick: int, observation: Observation, operator: OperatorState = NOBODY
+    ) -> TickInputs:
         """Everything the tree may know at this tick."""
         scene, board = self._twin.scene, self._board
-        operator_stop = self._operator_stop()
         sensed = sense(self._latest.update(observation), scene)
         missing = {
             **self._standstill(sensed.time_s),
-            **self._arms.faults(sensed, driven_by_hand=operator_stop is not None),
+            **self._arms.faults(sensed, driven_by_hand=operator.forbids is not None),
             **stale(sensed, scene),
         }
         if self._grips.update(sensed, unsound=missing):
@@ -86,7 +86,7 @@ class Perception:
             force_n=force_n,
             force_threshold_n=self._force_threshold_n,
             reading=reading,
-            operator_stop=operator_stop,
+            operator=operator,
             force_over_s=board.force_over_s,
         )
 

@@ -27,6 +27,7 @@ BUILTIN_NODE_MODULES: tuple[str, ...] = (
     "defras_bt.monitoring.guards",
     "defras_bt.learning.nodes",
     "defras_bt.planning.nodes",
+    "defras_bt.executive.operator_nodes",
     "defras_bt.executive.nodes",
     "defras_bt.executive.port_nodes",
 )

@@ -26,6 +26,7 @@ from defras_bt.recording.decision_reader import read_decisions
 from defras_bt.recording.inputs import TickInput
 from defras_bt.recording.inputs_reader import RecordedInputs, read_inputs
 from defras_bt.recording.moment import Moment, moment_of
+from defras_bt.recording.operator_state import OperatorState
 from defras_bt.recording.record import Recorder, RunInfo, RunSummary, TickRecord
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
@@ -112,6 +113,26 @@ class RecordedWorld:
         pass
 
 
+class _RecordedOperator:
+    """Wants what the operator wanted, and answers plans as they were answered."""
+
+    def __init__(self, world: RecordedWorld, moments: Mapping[int, Moment]) -> None:
+        self._world = world
+        self._moments = moments
+
+    def state(self) -> OperatorState:
+        return self._world.now.operator
+
+    def approve(self, plan: Plan) -> bool | None:
+        moment = self._moments.get(self._world.now.tick)
+        words = moment.nodes.values() if moment is not None else ()
+        said = {word.code for word in words if word.ticked}
+        return None if Code.AWAITING_APPROVAL in said else Code.PLAN_REFUSED not in said
+
+    def idle(self) -> None:
+        pass
+
+
 class _Comparison:
     """A recorder that compares each tick and ends the replay at the first that differs."""
 
@@ -191,12 +212,6 @@ def _replay(
         substitutes=recorded_substitutes(again, inputs.file),
     )
 
-    def approve(plan: Plan) -> bool:
-        moment = moments.get(world.now.tick)
-        return moment is None or all(
-            word.code != Code.PLAN_REFUSED for word in moment.nodes.values() if word.ticked
-        )
-
     try:
         _, learning_rng = random_generators(seed)
         operate_in(
@@ -204,8 +219,7 @@ def _replay(
             operation,
             learning_rng,
             (comparison, *recorders),
-            approve=approve,
-            operator_stop=lambda: world.now.operator_stop,
+            operator=_RecordedOperator(world, moments),
             faults=FaultInjection(recorded_faults(again), scene, seed),
         )
     except ExecutiveFailed as error:

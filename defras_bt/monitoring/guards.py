@@ -10,6 +10,7 @@ from pydantic import Field
 
 from defras_bt.executive.dangers import LONGEST_PATIENCE_S
 from defras_bt.executive.node import Node, NodeParameters, Role
+from defras_bt.executive.operator_nodes import HOLDING_CODES
 from defras_bt.executive.reasons import Code
 from defras_bt.executive.registry import register_node
 
@@ -59,7 +60,7 @@ class SensorsFresh(Guard):
 
 @register_node
 class OperatorPermits(Guard):
-    """Succeeds unless the operator asked to stop, or refused a plan."""
+    """Succeeds unless the operator stopped, paused or took over, or refused a plan."""
 
     @classmethod
     def promise(cls, parameters: Any, variable: str, value: str) -> Status | None:
@@ -67,8 +68,9 @@ class OperatorPermits(Guard):
 
     def update(self) -> Status:
         board = self.context.board
-        if board.inputs.operator_stop:
-            return self.fail(Code.STOPPED, board.inputs.operator_stop)
+        operator = board.inputs.operator
+        if operator.forbids is not None:
+            return self.fail(HOLDING_CODES.get(operator.mode, Code.STOPPED), operator.forbids)
         if board.operator_refused:
             return self.fail(Code.PLAN_REFUSED, board.operator_refused)
         return self.succeed(Code.PERMITTED, "the operator permits motion")

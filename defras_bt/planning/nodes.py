@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from py_trees.common import Status
 from pydantic import Field
 
@@ -30,18 +32,42 @@ class ReplanParameters(NodeParameters):
     rehearse: Annotated[int, Field(ge=0)] = 0
 
 
+@dataclass(frozen=True)
+class Proposal:
+    """A plan that may wait for approval: ``exposing`` as in a Situation, and what it was made from.
+
+    ``attached`` (holes,) was believed then.
+    """
+
+    plan: Plan
+    exposing: tuple[str, ...]
+    situation: Situation
+    attached: NDArray[np.bool_]
+
+
 class PlanSource(RecoveryLeaf):
     """Base of the leaves that bring plans."""
 
     remedy: ClassVar[Remedy] = Remedy.REPLAN
 
-    def adopt(self, plan: Plan, why: str) -> Status:
-        """Put ``plan`` in place for the coming ticks, if the operator approves it."""
+    def adopt(self, plan: Plan, why: str, exposing: tuple[str, ...]) -> Status:
+        """Put ``plan`` in place for the coming ticks as soon as the operator approves it.
+
+        ``exposing``: the manoeuvres after which it counts on seeing the region.
+        """
         board = self.context.board
-        if not self.context.approve(plan):
+        approved = self.context.approve(plan)
+        if approved is None:
+            board.awaits_approval = True
+            return self.run(
+                Code.AWAITING_APPROVAL,
+                f"a plan of {len(plan.actions)} actions waits for the operator's approval",
+            )
+        if not approved:
             board.operator_refused = "the operator did not approve the plan"
             return self.fail(Code.PLAN_REFUSED, board.operator_refused)
         board.new_plan = plan
+        board.plan_exposing = exposing
         board.plan_belief = self.context.scene.attached
         board.tell("plan", why, data={"actions": [str(action) for action in plan.actions]})
         return self.succeed(Code.PLANNED, why)
@@ -59,10 +85,12 @@ class UsePreoperativePlan(PlanSource):
             return self.fail(
                 Code.USED_ALREADY, "the plan from before the operation was used already"
             )
-        board.preoperative_used = True
-        board.plan_exposing = tuple(a.name for a in plan.actions if a.name in MANOEUVRES)
-        steps = len(plan.actions)
-        return self.adopt(plan, f"The plan made before the operation is used: {steps} actions.")
+        exposing = tuple(a.name for a in plan.actions if a.name in MANOEUVRES)
+        why = f"The plan made before the operation is used: {len(plan.actions)} actions."
+        status = self.adopt(plan, why, exposing)
+        # One that waits in vain, because the operator pauses meanwhile, may be shown again.
+        board.preoperative_used = status != Status.RUNNING
+        return status
 
 
 @register_node
@@ -72,12 +100,35 @@ class Replan(PlanSource):
     Parameters = ReplanParameters
     parameters: ReplanParameters
 
+    def initialise(self) -> None:
+        self._proposal: Proposal | None = None
+
     def recover(self) -> Status:
+        proposal = self._proposal
+        if proposal is None or not self._still_fits(proposal):
+            return self._propose()
+        return self._adopt(proposal)
+
+    def _still_fits(self, proposal: Proposal) -> bool:
+        """Whether all is still as it was when the plan was made that waits for approval."""
+        situation = self._situation(frozenset(), self.parameters.exposing)
+        attached = self.context.scene.attached
+        return situation == proposal.situation and np.array_equal(attached, proposal.attached)
+
+    def _adopt(self, proposal: Proposal) -> Status:
+        plan = proposal.plan
+        why = f"A plan of {len(plan.actions)} actions was found."
+        return self.adopt(plan, why, proposal.exposing)
+
+    def _propose(self) -> Status:
         board = self.context.board
         first = board.plan is None and not board.preoperative_used
         self._block_exhausted()
+        situation = self._situation(frozenset(), self.parameters.exposing)
         try:
-            plan = self._rehearsed() if self.parameters.rehearse else self._plan(frozenset())
+            plan, exposing = (
+                self._rehearsed() if self.parameters.rehearse else self._plan(frozenset())
+            )
         except NoPlan as error:
             board.no_plan = str(error)
             return self.fail(Code.IMPOSSIBLE, str(error))
@@ -87,7 +138,8 @@ class Replan(PlanSource):
             board.tell(
                 "replan", f"Planned anew from what is true now: {len(plan.actions)} actions."
             )
-        return self.adopt(plan, f"A plan of {len(plan.actions)} actions was found.")
+        self._proposal = Proposal(plan, exposing, situation, self.context.scene.attached)
+        return self._adopt(self._proposal)
 
     def _block_exhausted(self) -> None:
         """A retraction that ended without showing the region will not show it later."""
@@ -121,15 +173,15 @@ class Replan(PlanSource):
         skipped: frozenset[GridPoint],
         exposing: tuple[str, ...] | None = None,
         grasp: GridPoint | None = None,
-    ) -> Plan:
+    ) -> tuple[Plan, tuple[str, ...]]:
+        """A plan, and the manoeuvres after which it counts on seeing the region."""
         situation = self._situation(skipped, exposing or self.parameters.exposing)
         plan = self.context.planner.plan(
             situation, self.context.scene.attached, required_grasp=grasp
         )
-        self.context.board.plan_exposing = situation.exposing
-        return plan
+        return plan, situation.exposing
 
-    def _rehearsed(self) -> Plan:
+    def _rehearsed(self) -> tuple[Plan, tuple[str, ...]]:
         """The first plan in the planner's order of preference that exposes in simulation.
 
         If none does, the one that came closest: the model may be wrong, and looking tells.
@@ -138,7 +190,7 @@ class Replan(PlanSource):
         best: tuple[float, GridPoint, tuple[str, ...]] | None = None
         for _ in range(self.parameters.rehearse):
             try:
-                plan = self._plan(skipped)
+                plan, _ = self._plan(skipped)
             except NoPlan:
                 if best is None:
                     raise

@@ -38,7 +38,7 @@ class DecisionRecorder:
         line: dict[str, Any] = {
             "tick": record.tick,
             "time_s": record.time_s,
-            "operator": record.operator,
+            "operator": record.operator.mode.value,
             "cause": _cause(record.cause),
             "stopped_by": _cause(record.stopped_by),
             "ended": _cause(record.ended),

@@ -15,7 +15,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
+from defras_bt.recording.operator_state import NOBODY, OperatorState
 from defras_bt.recording.record import RunInfo, TickRecord
 from defras_bt.sensing.sense import SensedObservation
 from defras_sim.geometry import Floats, Pose
@@ -24,14 +26,16 @@ from defras_sim.worlds.protocol import ArmObservation, Observation, PointCloud
 SETUP_TOPIC = "/executive/setup"
 INPUTS_TOPIC = "/executive/inputs"
 
+_OPERATOR: TypeAdapter[OperatorState] = TypeAdapter(OperatorState)
+
 
 @dataclass(frozen=True)
 class TickInput:
-    """What one tick was told. ``operator_stop``: why the operator wants motion to stop, or None."""
+    """What one tick was told."""
 
     tick: int
     observation: SensedObservation
-    operator_stop: str | None
+    operator: OperatorState
 
 
 def setup_text(info: RunInfo) -> str:
@@ -57,8 +61,8 @@ def input_text(record: TickRecord, cloud: int | None) -> str:
         "time_s": record.time_s,
         **_observed(record.observation, cloud),
     }
-    if record.operator_stop is not None:
-        content["operator_stop"] = record.operator_stop
+    if record.operator != NOBODY:
+        content["operator"] = _OPERATOR.dump_python(record.operator, mode="json")
     return _text(content)
 
 
@@ -75,7 +79,9 @@ def read_input(text: str, clouds: Sequence[Floats]) -> TickInput:
         faults=tuple(content.get("faults", ())),
         dropped_points=content.get("dropped_points", 0),
     )
-    return TickInput(content["tick"], observation, content.get("operator_stop"))
+    return TickInput(
+        content["tick"], observation, _OPERATOR.validate_python(content.get("operator", NOBODY))
+    )
 
 
 def _observed(seen: Observation, cloud: int | None) -> Mapping[str, Any]:

@@ -65,7 +65,7 @@ def moment_of(record: TickRecord, kinds: Mapping[str, str]) -> Moment:
         cause=record.cause,
         stopped_by=record.stopped_by,
         ended=record.ended,
-        operator=record.operator,
+        operator=record.operator.mode.value,
         events=record.events,
     )
 

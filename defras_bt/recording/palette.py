@@ -28,6 +28,12 @@ WARNING_STATES: tuple[Rgb, Rgb, Rgb, Rgb] = (
     (238, 132, 50),
     (204, 50, 50),
 )
+OPERATOR_MODES: dict[str, Rgb] = {
+    "autonomous": (206, 212, 220),
+    "paused": (240, 196, 66),
+    "taken_over": (150, 110, 210),
+    "stopped": (204, 50, 50),
+}
 NODE_STATES: dict[str, Rgb] = {
     "RUNNING": (74, 134, 232),
     "SUCCESS": (92, 176, 118),

@@ -91,6 +91,8 @@ def progress_line(record: TickRecord, info: RunInfo) -> Table:
 
 
 def _action(record: TickRecord) -> str:
+    if record.operator.holds:
+        return record.operator.mode.value.replace("_", " ").upper()
     if record.plan is None or record.action is None:
         return "no action"
     return f"{record.action.time}/{len(record.plan.actions)} {action_sentence(record.action)}"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import Action, Plan
+from defras_bt.recording.operator_state import NOBODY, OperatorState
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
 from defras_sim.tissue.state import TissueState
@@ -61,10 +62,10 @@ class TickRecord:
     last status it had, and ``node_decider`` to the child that decided it. ``cause`` is the leaf
     that decided the whole tree; ``stopped_by`` the one because of which no plan is carried out,
     None while one is, or where nobody asked. ``ended`` is why the run ended with this tick, None
-    while it goes on. ``operator`` is "autonomous", "paused", "taken_over" or "stopped",
-    ``operator_stop`` why. ``sent`` left the gate; ``proposed`` came from the tree. ``believed``
-    (holes,) marks the attachments believed now. ``plan`` is the latest plan,
-    ``plan_step`` the 0-based index of the action in it that is carried out, None while none is.
+    while it goes on. ``operator`` is what the operator wanted. ``sent`` left the gate;
+    ``proposed`` came from the tree. ``believed`` (holes,) marks the attachments believed now.
+    ``plan`` is the latest plan, ``plan_step`` the 0-based index of the action in it that is carried
+    out, None while none is.
     """
 
     tick: int
@@ -90,8 +91,7 @@ class TickRecord:
     cause: Cause | None = None
     stopped_by: Cause | None = None
     ended: Cause | None = None
-    operator: str = "autonomous"
-    operator_stop: str | None = None
+    operator: OperatorState = NOBODY
 
     @property
     def action(self) -> Action | None:

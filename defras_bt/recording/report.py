@@ -119,6 +119,9 @@ def _tiles(values: Any) -> list[Tile]:
     replans = values["replans"]
     anew = f"planned anew {times(replans)}" if replans else "never planned anew"
     limit = f"limit {newton(values['force_threshold_n'])}"
+    operator = values["operator"]
+    held = f"held for {operator['held_s']:.1f} s" if operator["held_s"] else "never held"
+    acts = [Tile("Operator's acts", str(len(operator["acts"])), held)] if operator["acts"] else []
     return [
         Tile(
             "Region visible",
@@ -151,6 +154,7 @@ def _tiles(values: Any) -> list[Tile]:
             f"{values['duration_s']:.1f} s",
             f"world time; {values['wall_s']:.0f} s on the clock",
         ),
+        *acts,
     ]
 
 

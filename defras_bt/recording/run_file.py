@@ -34,16 +34,44 @@ class Warnings(BaseModel):
     state_3: Count = Field(alias="3")
 
 
+class Reason(BaseModel):
+    """Why the run ended."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    code: str = Field(description="stable word; defras explain says what it means")
+    sentence: str
+
+
+class OperatorAct(BaseModel):
+    """Something the operator did while the run went on."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    time_s: Seconds = Field(description="world time")
+    act: str = Field(description="pause, resume, stop, take_over, hand_back, approve or refuse")
+    source: str = Field(description="front end: keyboard, socket, Ctrl-C, ...")
+    words: str = Field(description="what the operator added")
+
+
+class OperatorLog(BaseModel):
+    """The operator's part in the run."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    acts: list[OperatorAct]
+    held_s: Seconds = Field(description="world time paused or taken over")
+
+
 class RunFile(BaseModel):
     """What one run came to."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, title="run.json")
     outcome: Outcome = Field(description="goal, not_reached, human (asked for) or error")
+    reason: Reason | None = Field(description="why the run ended; null if it broke off at once")
     roi_visibility: Share | None = Field(description="share of the region seen at the end")
     actions: Count = Field(description="actions finished")
     replans: Count = Field(description="new plans asked for after the first")
     warnings: Warnings
     attachment_updates: AttachmentUpdates
+    operator: OperatorLog
     force_threshold_n: Newton = Field(description="epsilon")
     force_max_n: Newton | None = Field(description="largest grasp force that the twin estimated")
     force_mean_n: Newton | None = Field(description="mean of the estimate over ticks above 0")

@@ -7,7 +7,7 @@ import math
 import os
 from pathlib import Path
 
-from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
+from defras_bt.recording.record import Cause, RunInfo, RunSummary, TickRecord
 from defras_bt.recording.run_file import Outcome, RunFile
 
 
@@ -25,6 +25,9 @@ class SummaryRecorder:
         self._adopted = 0
         self._warnings = [0, 0, 0, 0]
         self._state = 0
+        self._reason: Cause | None = None
+        self._acts: list[dict[str, object]] = []
+        self._held_ticks = 0
         self._force_max_n: float | None = None
         self._force_true_max_n: float | None = None
         self._force_sum_n, self._force_ticks, self._ticks_over = 0.0, 0, 0
@@ -41,6 +44,8 @@ class SummaryRecorder:
         seen = record.observation.roi_visibility
         if seen is not None and math.isfinite(seen):
             self._visibility = seen
+        self._reason = record.ended or self._reason
+        self._held_ticks += record.operator.holds
         self._count_events(record)
         self._count_warnings(record)
         self._count_force(record)
@@ -51,11 +56,17 @@ class SummaryRecorder:
         file = RunFile.model_validate(
             {
                 "outcome": outcome,
+                "reason": self._reason
+                and {"code": self._reason.code, "sentence": self._reason.message},
                 "roi_visibility": self._visibility,
                 "actions": self._events["action"],
                 "replans": self._events["replan"],
                 "warnings": {str(state): self._warnings[state] for state in (1, 2, 3)},
                 "attachment_updates": {"tried": self._events["learning"], "adopted": self._adopted},
+                "operator": {
+                    "acts": self._acts,
+                    "held_s": self._held_ticks * info.scene.tick_s,
+                },
                 "force_threshold_n": info.force_threshold_n,
                 "force_max_n": self._force_max_n,
                 "force_mean_n": self._force_sum_n / self._force_ticks
@@ -90,6 +101,8 @@ class SummaryRecorder:
         for event in record.events:
             if event.kind in self._events:
                 self._events[event.kind] += 1
+            if event.kind == "operator" and "act" in event.data:
+                self._acts.append({"time_s": event.time_s, **event.data})
             if event.kind == "learning":
                 if not isinstance(event.data.get("adopted"), bool):
                     raise ValueError(

@@ -70,7 +70,9 @@ def default_blueprint(*, truth_known: bool, pictures: bool) -> rrb.Blueprint:
     )
     right = rrb.Vertical(
         rrb.StateTimelineView(
-            origin="/", contents=["/monitor/**", "/plan/action"], name="Warnings and actions"
+            origin="/",
+            contents=["/operator/mode", "/monitor/**", "/plan/action"],
+            name="Operator, warnings, actions",
         ),
         rrb.StateTimelineView(origin="/executive", name="Nodes of the behaviour tree"),
         _plot("Discrepancy mu [mm]", "mu_mm"),

@@ -24,9 +24,13 @@ _WARNING_LANE = {
     )
 }
 
+_OPERATOR_LANE = {
+    mode: (mode.replace("_", " "), colour) for mode, colour in palette.OPERATOR_MODES.items()
+}
+
 
 class Lanes:
-    """Warning state, action, and one lane per node; a lane is written when its state changes."""
+    """Operator, warning state, action, and one lane per node, each written when it changes."""
 
     def __init__(self, stream: rr.RecordingStream, info: RunInfo) -> None:
         self._stream = stream
@@ -35,6 +39,7 @@ class Lanes:
         self._kinds = dict(info.tree_paths)
         self._status: dict[str, str] = {}
         self._log_lane("monitor/warning_state", _WARNING_LANE)
+        self._log_lane("operator/mode", _OPERATOR_LANE)
         self._log_lane("plan/action", {name: (name, c) for name, c in palette.ACTIONS.items()})
         for path in self._kinds:
             self._log_lane(_lane_of(path), _NODE_LANE)
@@ -45,6 +50,8 @@ class Lanes:
         if self._changes.new("warning_state", state):
             said = "" if state is None else str(state)
             self._stream.log("monitor/warning_state", rr.StateChange(state=said))
+        if self._changes.new("operator", record.operator.mode):
+            self._stream.log("operator/mode", rr.StateChange(state=record.operator.mode.value))
         action = record.action
         if self._changes.new("action", action):
             self._stream.log(

@@ -10,10 +10,12 @@ import numpy as np
 
 from defras_bt.executive.deadline import Deadline
 from defras_bt.executive.executive import Executive
+from defras_bt.executive.operator_desk import OperatorDesk
 from defras_bt.executive.perception import Perception
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
 from defras_bt.executive.testing import EPSILON_N, NodeBench
 from defras_bt.recording.composite import CompositeRecorder
+from defras_bt.recording.operator_state import Act
 from defras_bt.recording.record import Recorder, RunInfo, RunSummary, TickRecord
 from defras_sim.resources import resource
 
@@ -56,7 +58,7 @@ class Stage:
         substitutes: Substitutes = NOTHING_SUBSTITUTED,
     ) -> None:
         self.bench = bench if bench is not None else NodeBench()
-        self.operator_stop: str | None = None
+        self.desk = OperatorDesk()
         self.notes = Notes()
         self.recorder = CompositeRecorder([self.notes, *beside])
         bench = self.bench
@@ -66,7 +68,6 @@ class Stage:
             bench.monitor,
             bench.keyframes,
             EPSILON_N,
-            lambda: self.operator_stop,
         )
         file = tree if isinstance(tree, Path) else resource(f"trees/{tree}.yaml")
         self.executive = Executive(
@@ -78,6 +79,7 @@ class Stage:
             max_time_s,
             deadline,
             substitutes,
+            self.desk,
         )
 
     @property
@@ -87,6 +89,11 @@ class Stage:
     @property
     def slot(self):
         return self.executive.tree.plan_slot
+
+    def operator(self, act: Act, words: str = "") -> None:
+        """The operator does this; it must be possible."""
+        answer = self.desk.request(act, "test", words)
+        assert answer.accepted, answer.sentence
 
     def warn(self, state: int) -> None:
         """The metric that the tree listens to is in ``state``; the other one stays quiet."""

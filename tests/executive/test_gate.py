@@ -21,6 +21,7 @@ from defras_bt.executive.gate import (
 )
 from defras_bt.executive.testing import bench_scene, flat_cloud_m, flat_state
 from defras_bt.monitoring.reading import MonitorReading
+from defras_bt.recording.operator_state import Mode, OperatorState
 from defras_sim.arm.closed_form import joints_of
 from defras_sim.arm.dh import JOINT_SPEED
 from defras_sim.arm.kinematics import Unreachable, joints_for
@@ -166,7 +167,10 @@ TISSUE_TRIPS = {
 }
 BLIND_TRIPS = {
     "something is missing": ({"missing": ("no cloud", "psm2 is old")}, "no cloud"),
-    "the operator stops": ({"operator_stop": "the pedal is pressed"}, "the pedal is pressed"),
+    "the operator stops": (
+        {"operator": OperatorState(Mode.STOPPED, "the pedal is pressed")},
+        "the pedal is pressed",
+    ),
 }
 
 

@@ -13,6 +13,7 @@ from defras_bt.executive.blackboard import Blackboard
 from defras_bt.executive.deadline import TreeStuck, interrupting
 from defras_bt.executive.executive import REFUSED_PATIENCE_S, ExecutiveFailed
 from defras_bt.executive.node import Node
+from defras_bt.recording.operator_state import Act
 from defras_sim.worlds.protocol import HOLD, ArmCommand, Command
 from tests.executive.stage import Stage, moving, still
 
@@ -101,9 +102,9 @@ class TestCommands:
         """It hands in its command behind the tree's back; the inputs alone decide."""
         stage = with_leaf(moves_up)
         assert any(moving(stage.tick()).values())
-        stage.operator_stop = "stop"
+        stage.operator(Act.PAUSE)
         assert still(stage.tick())
-        stage.operator_stop = None
+        stage.operator(Act.RESUME)
         assert any(moving(stage.tick()).values())
         stage.bench.world.cloud_m = None
         assert still(stage.tick())

@@ -10,6 +10,7 @@ import pytest
 from defras_bt.executive.blackboard import LearningAttempt
 from defras_bt.executive.perception import Perception
 from defras_bt.executive.testing import EPSILON_N, MU_M, NodeBench
+from defras_bt.recording.operator_state import NOBODY, Mode, OperatorState
 from defras_sim.geometry import Pose
 from defras_sim.worlds.protocol import JAW_CLOSED_RAD, JAW_OPEN_RAD, ArmCommand, Command
 
@@ -22,7 +23,7 @@ class Senses:
 
     def __init__(self) -> None:
         self.bench = NodeBench()
-        self.operator_stop: str | None = None
+        self.operator = NOBODY
         bench = self.bench
         self.perception = Perception(
             bench.board,
@@ -30,13 +31,12 @@ class Senses:
             bench.monitor,
             bench.keyframes,
             EPSILON_N,
-            lambda: self.operator_stop,
         )
 
     def look(self):
         """The inputs of this tick; then a tick passes."""
         world = self.bench.world
-        inputs = self.perception.update(world.ticks, world.observe())
+        inputs = self.perception.update(world.ticks, world.observe(), self.operator)
         world.step()
         return inputs
 
@@ -49,9 +49,9 @@ class Senses:
         self.bench.put("psm1", (*self.bench.scene.grasp_xy_m(2, 4), 0.0))
         self.bench.board.at["psm1"] = (2, 4)
         # No arm gets there within a tick, unless by hand.
-        self.operator_stop = "the operator drives"
+        self.operator = OperatorState(Mode.TAKEN_OVER, "the operator drives")
         self.look()
-        self.operator_stop = None
+        self.operator = NOBODY
         self.turn_jaw(JAW_OPEN_RAD)
         self.turn_jaw(JAW_CLOSED_RAD)
 
@@ -86,10 +86,10 @@ class TestMissingReadings:
         senses.bench.world.visibility = 1.2
         assert any("1.2" in sentence for sentence in senses.look().missing)
 
-    def test_the_operator_is_asked_every_tick(self, senses):
-        assert senses.look().operator_stop is None
-        senses.operator_stop = "the pedal is pressed"
-        assert senses.look().operator_stop == "the pedal is pressed"
+    def test_what_the_operator_wants_is_passed_on_every_tick(self, senses):
+        assert senses.look().operator.forbids is None
+        senses.operator = OperatorState(Mode.STOPPED, "the pedal is pressed")
+        assert senses.look().operator.forbids == "the pedal is pressed"
 
 
 class TestForce:

@@ -11,6 +11,7 @@ from py_trees.common import Status
 from defras_bt.executive.dangers import LONGEST_PATIENCE_S, WORLD
 from defras_bt.executive.registry import builtin_nodes
 from defras_bt.executive.testing import EPSILON_N, NodeBench
+from defras_bt.recording.operator_state import NOBODY, Mode, OperatorState
 from defras_sim.worlds.protocol import HOLD
 
 Situation = Callable[[NodeBench], None]
@@ -35,8 +36,11 @@ def warning(state: int | None) -> Situation:
 SITUATIONS: dict[tuple[str, str], list[Situation]] = {
     ("readings", "fresh"): [says(missing=())],
     ("readings", "missing"): [says(missing=("no cloud",)), says(missing=("a", "b"))],
-    ("operator", "silent"): [says(operator_stop=None)],
-    ("operator", "stops"): [says(operator_stop="the pedal was pressed")],
+    ("operator", "silent"): [says(operator=NOBODY)],
+    ("operator", "stops"): [
+        says(operator=OperatorState(mode, "the pedal was pressed"))
+        for mode in (Mode.STOPPED, Mode.PAUSED, Mode.TAKEN_OVER)
+    ],
     ("force", "tolerable"): [force_for(0.0, 0.1), force_for(0.3)],
     ("force", "dangerous"): [
         force_for(LONGEST_PATIENCE_S),

@@ -11,6 +11,7 @@ import pytest
 
 from defras_bt.executive.executive import ExecutiveFailed
 from defras_bt.executive.operation import Operation, operate, operate_in, random_generators
+from defras_bt.executive.operator_desk import OperatorDesk
 from defras_bt.executive.replay import replay
 from defras_bt.executive.scripted import Script
 from defras_bt.executive.substitution import Substitute, Substitutes
@@ -21,6 +22,7 @@ from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.decision_reader import read_decisions
 from defras_bt.recording.decisions import DECISIONS_FILE, DecisionRecorder
 from defras_bt.recording.inputs_reader import BAG, NoInputs, read_inputs
+from defras_bt.recording.operator_state import Act
 from defras_bt.recording.record import Recorder
 from defras_sim.resources import resource
 from defras_sim.scene import Attachments, Roi, Scene, Simulation, Tissue
@@ -76,6 +78,20 @@ def run(recorded, tmp_path) -> Path:
     return Path(shutil.copytree(recorded, tmp_path / "run"))
 
 
+class Scripted(OperatorDesk):
+    """An operator who does ``acts`` by tick."""
+
+    def __init__(self, acts, *, asks=False):
+        super().__init__(asks=asks)
+        self._by_tick, self._tick = acts, 0
+
+    def state(self):
+        if self._tick in self._by_tick:
+            assert self.request(self._by_tick[self._tick], "test").accepted
+        self._tick += 1
+        return super().state()
+
+
 class TestUnchanged:
     def test_nothing_differs_not_even_a_word(self, recorded):
         result = replay(recorded)
@@ -84,22 +100,32 @@ class TestUnchanged:
         assert result.broke is None
 
     def test_what_the_operator_said_is_part_of_it(self, tmp_path):
-        ticks = []
+        operator = Scripted({12: Act.PAUSE, 20: Act.RESUME, 40: Act.STOP})
         summary = operate(
-            operation(resource("trees/fras.yaml")),
-            recorders(tmp_path),
-            operator_stop=lambda: ticks.append(1) or ("enough" if len(ticks) > 20 else None),
+            operation(resource("trees/fras.yaml")), recorders(tmp_path), operator=operator
         )
         assert summary.values["outcome"] == "human"
         result = replay(tmp_path)
-        assert (result.ticks, result.difference) == (21, None)
+        assert (result.ticks, result.difference) == (41, None)
 
     def test_a_refused_plan_is_refused_again(self, tmp_path):
         summary = operate(
-            operation(resource("trees/fras.yaml")), recorders(tmp_path), approve=lambda plan: False
+            operation(resource("trees/fras.yaml")),
+            recorders(tmp_path),
+            operator=Scripted({9: Act.REFUSE}, asks=True),
         )
         assert summary.values["outcome"] == "human"
         assert replay(tmp_path).difference is None
+
+    def test_a_plan_that_waited_for_approval_waits_again(self, tmp_path):
+        summary = operate(
+            operation(resource("trees/fras.yaml"), max_time_s=2.0),
+            recorders(tmp_path),
+            operator=Scripted({9: Act.APPROVE}, asks=True),
+        )
+        assert [act["act"] for act in summary.values["operator"]["acts"]] == ["approve"]
+        result = replay(tmp_path)
+        assert (result.ticks > 20, result.difference) == (True, None)
 
     @pytest.mark.parametrize(
         ("faults", "codes"),

@@ -10,6 +10,7 @@ import pytest
 
 from defras_bt.executive.testing import NodeBench, bench_scene, plan_of
 from defras_bt.planning.plan import Plan
+from defras_bt.recording.operator_state import Act
 from defras_sim.worlds.protocol import HOLD, JAW_OPEN_RAD
 from tests.executive.stage import FORCE_TOO_HIGH_N, Stage, doing, jaws, leaves, moving, still, told
 
@@ -352,15 +353,18 @@ class TestOperator:
     @pytest.mark.parametrize("phase", PHASES)
     def test_a_stop_holds_in_the_same_tick(self, stage, phase):
         stage.until_doing(phase)
-        stage.operator_stop = "the operator pressed the pedal"
+        stage.operator(Act.STOP, "the pedal")
         last = stage.tick()
         assert last.sent == HOLD
         assert doing(last) is None
-        assert (stage.board.outcome, stage.board.outcome_reason) == ("human", stage.operator_stop)
+        assert stage.board.outcome == "human"
+        assert stage.board.outcome_reason == "the operator asked to stop: the pedal"
+        assert stage.board.outcome_cause.code == "stopped"
 
     def test_a_stop_counts_more_than_the_goal(self, stage):
         stage.until_doing("fold")
-        stage.operator_stop, stage.bench.world.visibility = "stop", 1.0
+        stage.operator(Act.STOP)
+        stage.bench.world.visibility = 1.0
         stage.tick()
         assert stage.board.outcome == "human"
 

@@ -3,6 +3,7 @@
 import py_trees
 import pytest
 
+from defras_bt.recording.operator_state import Act
 from tests.executive.stage import Stage
 
 TICKS = 80
@@ -25,7 +26,7 @@ def events_of(stage, tick, disturbed):
         stage.warn(0)
         stage.bench.board.ports.write("strange", object())
     if disturbed and tick == 60:
-        stage.operator_stop = "the pedal was pressed"
+        stage.operator(Act.STOP, "the pedal was pressed")
 
 
 def alone(disturbed):

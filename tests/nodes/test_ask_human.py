@@ -4,13 +4,16 @@ import pytest
 from py_trees.common import Status
 
 from defras_bt.executive.nodes import AskHuman
+from defras_bt.recording.operator_state import Mode, OperatorState
+
+PEDAL = OperatorState(Mode.STOPPED, "the pedal is pressed")
 
 
 @pytest.mark.parametrize(
     ("says", "expected"),
     [
-        ({"operator_stop": "the pedal is pressed"}, "the pedal is pressed"),
-        ({"operator_stop": "the pedal is pressed", "missing": ("no cloud",)}, "the pedal is"),
+        ({"operator": PEDAL}, "the pedal is pressed"),
+        ({"operator": PEDAL, "missing": ("no cloud",)}, "the pedal is"),
         ({"missing": ("no cloud", "psm1 is 0.60 s old")}, "no cloud; psm1 is 0.60 s old"),
         ({}, "no safe way to go on was found"),
     ],

@@ -43,7 +43,8 @@ def test_a_human_is_asked_because_the_model_is_lost(stage: Stage) -> None:
         "The operation ended. The tissue is 7.0 mm away from where the model expects it [warned]."
     )
     assert said.chain[:2] == (
-        '"defras" chose "human".',
+        '"defras" chose "human"; before it, these did not apply: '
+        '"operator" (the operator neither paused nor took over).',
         '"human" came to its end with "ask human", after "needed" (the warning state is 3).',
     )
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from defras_bt.recording.record import Event
+from defras_bt.recording.operator_state import Mode, OperatorState
+from defras_bt.recording.record import Cause, Event
 from defras_bt.recording.run_file import SCHEMA_FILE, RunFile, schema_text
 from defras_bt.recording.summary import SummaryRecorder, read_run_json
 from defras_bt.recording.versions import versions
@@ -16,6 +17,8 @@ from tests.recording.synthetic_run import SyntheticRun
 
 # The keys that the documentation of recordings promises, and the mean force.
 PROMISED = {
+    "reason",
+    "operator",
     "outcome",
     "roi_visibility",
     "actions",
@@ -81,6 +84,7 @@ def test_what_nobody_knows_is_null(short_run: SyntheticRun) -> None:
     values = recorder.summary("error", wall_s=0.0).values
     unknown = [key for key, value in values.items() if value is None]
     assert unknown == [
+        "reason",
         "roi_visibility",
         "force_max_n",
         "force_mean_n",
@@ -118,3 +122,18 @@ def test_learning_without_a_verdict_is_an_error(short_run: SyntheticRun) -> None
 
 def test_versions_name_the_interpreter_and_the_engine() -> None:
     assert {"python", "defras", "py-trees", "numpy"} <= set(versions())
+
+
+def test_the_reason_and_the_operator_s_acts_are_kept(short_run: SyntheticRun) -> None:
+    recorder = SummaryRecorder()
+    recorder.start(short_run.info)
+    first, second, third = short_run.ticks()[:3]
+    pause = {"act": "pause", "source": "keyboard", "words": "swab"}
+    told = Event(first.time_s, "operator", "warning", "The operator paused.", pause)
+    recorder.tick(replace(first, operator=OperatorState(Mode.PAUSED, "paused"), events=(told,)))
+    recorder.tick(replace(second, operator=OperatorState(Mode.TAKEN_OVER, "taken over")))
+    recorder.tick(replace(third, ended=Cause("stopped", "the operator asked to stop")))
+    values = recorder.summary("human", wall_s=1.0).values
+    assert values["reason"] == {"code": "stopped", "sentence": "the operator asked to stop"}
+    assert values["operator"]["acts"] == [{"time_s": first.time_s, **pause}]
+    assert values["operator"]["held_s"] == pytest.approx(2 * short_run.info.scene.tick_s)

@@ -57,7 +57,7 @@ CLAIMS: tuple[Claim, ...] = (
     ),
     Claim(
         "operator_stops",
-        "in the tick in which the operator stops nothing is commanded",
+        "while the operator stops, pauses or drives nothing is commanded",
         ("operator", "stops"),
         "command",
     ),
