@@ -11,9 +11,10 @@ import typer
 from rich.console import Console
 
 from defras_bt.cli.errors import ExitCode, UserError
+from defras_sim.rest_shape import NotASlab
 from defras_sim.yaml_source import InvalidFile
 
-COMMANDS = ("run", "plan", "view", "explain", "operator", "replay", "doctor")
+COMMANDS = ("run", "plan", "view", "explain", "replay", "doctor")
 """Commands, each the function of its name in the module of its name."""
 
 GROUPS = ("scene", "tree", "benchmark")
@@ -59,7 +60,7 @@ def run_commands() -> None:
         for fault in error.faults:
             console.print(str(fault), style="red", markup=False)
         sys.exit(ExitCode.INVALID)
-    except UserError as error:
+    except (UserError, NotASlab) as error:
         console.print(str(error), style="red", markup=False)
         sys.exit(ExitCode.INVALID)
     except Exception as error:

@@ -41,5 +41,7 @@ def explain_plan(file: Path, scene: str | None, why_not: str | None, console: Co
 def _scene_of(result: PreoperativeResult, named: str | None) -> Scene:
     """The scene the plan was made for, in the model world or in PyBullet."""
     _, believed = find_scene(named or result.scene)
+    if believed.tissue.anatomy is not None:
+        return believed
     bullet = believed.for_bullet()
     return bullet if scene_hash(bullet) == result.scene_hash else believed

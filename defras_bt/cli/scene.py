@@ -20,7 +20,7 @@ from defras_sim.anatomy.refused import RefusedSurface
 from defras_sim.anatomy.repair import sound_surface
 from defras_sim.anatomy.solid import tissue_of
 from defras_sim.scene_file import write_scene, write_variant
-from defras_sim.scene_from_surface import believed_scene
+from defras_sim.scene_from_surface import believed_scene, require_rest
 from defras_sim.scene_generator import NoScene, generate_scene
 from defras_sim.scene_picture import draw_scene
 
@@ -146,6 +146,8 @@ def from_mesh(
                 thickness_m=thickness_m,
                 held=held.value,
             )
+            status.update("looking whether the tissue lies still")
+            require_rest(made)
     except RefusedSurface as error:
         raise UserError(f"{surface}: {error}") from error
     write_scene(made, file)

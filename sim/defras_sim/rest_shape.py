@@ -18,6 +18,10 @@ from defras_sim.geometry import Floats
 Mask = NDArray[np.bool_]
 
 
+class NotASlab(ValueError):
+    """Asked of a patient's anatomy what only a slab can do."""
+
+
 class Face(Protocol):
     """One side of the resting tissue, a height over x and y."""
 

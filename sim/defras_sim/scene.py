@@ -15,6 +15,7 @@ from pydantic import Field
 
 from defras_sim.advice import Advice
 from defras_sim.geometry import Floats
+from defras_sim.rest_shape import NotASlab
 from defras_sim.scene_faults import scene_faults
 from defras_sim.scene_parts import (
     ARMS,
@@ -199,11 +200,12 @@ class Scene(Part):
         attachments are; that mismatch belongs to diagnosis, not to the retraction.
 
         Raises:
-            ValueError: the tissue is no slab.
+            NotASlab: the tissue is none.
         """
         if self.tissue.anatomy is not None:
-            raise ValueError(
-                "PyBullet's world simulates slabs only; a patient's anatomy runs in the model world"
+            raise NotASlab(
+                f"{self.name}: PyBullet's world simulates slabs only; a patient's anatomy runs in "
+                "the model world (--world model)"
             )
         shared = {
             "element": "tetrahedron4",

@@ -13,6 +13,7 @@ from defras_sim.camera.ray_caster import RayCaster
 from defras_sim.camera.visibility import roi_visibility
 from defras_sim.scene import Arm, ArmName, Attachments, Camera, Roi, Scene, Tissue
 from defras_sim.scene_parts import ARMS
+from defras_sim.tissue.model import TissueModel
 
 Edge = Literal["far", "near", "left", "right"]
 """Of the tissue, as the endoscope sees it, which looks along x."""
@@ -52,6 +53,23 @@ def believed_scene(
             "room for holes or grasp points; is the unit right?"
         )
     return _over_hidden_region(frame.with_attached(attached), anatomy)
+
+
+def require_rest(scene: Scene) -> None:
+    """Both meshes have to carry the surface, the holes and the bed, and to lie still on it.
+
+    Raises:
+        RefusedSurface: one of them does not.
+    """
+    for mesh, each in (("twin", scene), ("actual", scene.simulated)):
+        try:
+            rests = TissueModel(each).solve({}).converged
+        except ValueError as error:
+            raise RefusedSurface(
+                f"the mesh of the {mesh} tissue cannot be used: {error}"
+            ) from error
+        if not rests:
+            raise RefusedSurface(f"the {mesh} tissue does not lie still on its bed")
 
 
 def _set_up(tissue: Tissue, name: str, description: str) -> Scene:
