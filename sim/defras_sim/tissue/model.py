@@ -111,6 +111,9 @@ class TissueModel:
     def set_term(self, term: Term) -> None:
         """Add ``term``, or put it in the place of the one of its name; then solve again.
 
+        A "material" of another stiffness leaves the dents at holes and jaws as they are; tissue of
+        another modulus throughout is that of another scene.
+
         Raises:
             ValueError: the name is that of the attachments or of a grasp, which follow the holes
                 and the arms.

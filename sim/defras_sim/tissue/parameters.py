@@ -25,6 +25,7 @@ class TermParameter:
 
 
 YOUNG_MODULUS_SCALE = TermParameter("material", "stiffness_scale")
+"""Of the whole tissue: the mesh, and the dents that holes and jaws make in it."""
 POISSON_RATIO = TermParameter("material", "poisson_ratio")
 GRAVITY_M_S2 = TermParameter("gravity", "acceleration_m_s2")
 
@@ -96,8 +97,27 @@ class SpringChange:
         return self.forces_by.shape[2]
 
 
-def change_of(parameter: Parameter, balance: Balance) -> GradientChange | SpringChange:
-    """What ``parameter`` changes.
+Change = GradientChange | SpringChange
+
+
+def changes_of(parameter: Parameter, balance: Balance) -> list[Change]:
+    """Everything that ``parameter`` changes, in columns that belong together.
+
+    Raises:
+        ValueError: there is no such term, parameter, hole or holding arm.
+    """
+    changes = [_change_of(parameter, balance)]
+    if parameter == YOUNG_MODULUS_SCALE:
+        changes += [
+            SpringChange(balance.pulls(name).forces_by_modulus[:, :, None], name)
+            for name, term in balance.energy.terms.items()
+            if isinstance(term, SpringTerm)
+        ]
+    return changes
+
+
+def _change_of(parameter: Parameter, balance: Balance) -> Change:
+    """What ``parameter`` changes, by itself.
 
     Raises:
         ValueError: there is no such term, parameter, hole or holding arm.

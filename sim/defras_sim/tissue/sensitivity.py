@@ -19,16 +19,14 @@ from defras_sim.tissue.grasp import term_name
 from defras_sim.tissue.holes import TERM_NAME as ATTACHMENTS
 from defras_sim.tissue.parameters import (
     Balance,
-    GradientChange,
+    Change,
     Parameter,
     SpringChange,
     TipMotion,
-    change_of,
+    changes_of,
 )
 from defras_sim.tissue.response import Solve
 from defras_sim.tissue.surface import SurfaceMap
-
-Change = GradientChange | SpringChange
 
 BED = "bed"
 
@@ -61,16 +59,16 @@ def sensitivities(
     Raises:
         ValueError: a parameter does not exist, or is given twice.
     """
-    changes = {parameter: change_of(parameter, balance) for parameter in parameters}
+    changes = {parameter: changes_of(parameter, balance) for parameter in parameters}
     if len(changes) < len(parameters):
         twice = next(p for i, p in enumerate(parameters) if p in parameters[:i])
         raise ValueError(f"{twice} is given twice")
     columns = _columns(changes)
-    size = sum(change.columns for change in changes.values())
+    size = sum(each[0].columns for each in changes.values())
     nodes = balance.positions_m.shape
     right, bed_by = np.zeros((*nodes, size)), np.zeros((*nodes, size))
     explicit: dict[str, Floats] = {}
-    for parameter, change in changes.items():
+    for parameter, change in ((key, one) for key, each in changes.items() for one in each):
         where = columns[parameter]
         if isinstance(change, SpringChange):
             shape = (len(change.forces_by), 3, size)
@@ -100,11 +98,11 @@ def sensitivities(
     )
 
 
-def _columns(changes: Mapping[Parameter, Change]) -> dict[Parameter, slice]:
+def _columns(changes: Mapping[Parameter, Sequence[Change]]) -> dict[Parameter, slice]:
     columns, first = {}, 0
-    for parameter, change in changes.items():
-        columns[parameter] = slice(first, first + change.columns)
-        first += change.columns
+    for parameter, each in changes.items():
+        columns[parameter] = slice(first, first + each[0].columns)
+        first += each[0].columns
     return columns
 
 

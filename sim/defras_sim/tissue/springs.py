@@ -26,7 +26,9 @@ class Pulls:
     """What r springs do at given positions.
 
     ``forces_n`` (r, 3) act on the tissue. ``stiffness_n_per_m`` (r, 3, 3) is how they grow with the
-    stretch, ``forces_by_stiffness`` (r, 3) [m] with the stiffness of the springs themselves.
+    stretch, ``forces_by_stiffness`` (r, 3) [m] with the stiffness of the springs themselves,
+    ``forces_by_modulus`` (r, 3) [N] with the scale of the tissue's own stiffness, which makes dents
+    that much shallower.
     ``held_m`` (r, 3) are the held quantities of the tissue as it really is, dents included;
     ``passed_on`` (r, 3, 3) is the share of a force on them that reaches the mesh, and
     ``held_by_force`` (r, 3, 3) [m/N] how they move under it where the mesh stays.
@@ -35,6 +37,7 @@ class Pulls:
     forces_n: Floats
     stiffness_n_per_m: Floats
     forces_by_stiffness: Floats
+    forces_by_modulus: Floats
     held_m: Floats
     passed_on: Floats
     held_by_force: Floats
@@ -96,6 +99,7 @@ class Springs:
             forces_n=pull_n[:, None] * direction,
             stiffness_n_per_m=_along_and_across(direction, k * kept_along, k * kept_across),
             forces_by_stiffness=((size_m - depth_m) * kept_along)[:, None] * direction,
+            forces_by_modulus=(pull_n * (1 - kept_along))[:, None] * direction,
             held_m=mesh_m + depth_m[:, None] * direction,
             passed_on=_along_and_across(direction, kept_along, kept_across),
             held_by_force=_along_and_across(direction, slope * kept_along, secant * kept_across),
