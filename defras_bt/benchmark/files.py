@@ -12,17 +12,22 @@ from typing import Any
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem}
 table{border-collapse:collapse;width:100%;margin:1rem 0}th,td{padding:.3rem .6rem;text-align:right}
 th{border-bottom:2px solid #345;vertical-align:bottom}td{border-bottom:1px solid #dde}
-th:first-child,td:first-child{text-align:left}.good{color:#186a3b}.bad{color:#922b21}"""
+th:first-child,td:first-child{text-align:left}.good{color:#186a3b}.bad{color:#922b21}svg{max-width:100%;height:auto}"""
 
 Table = Sequence[Mapping[str, Any]]
 
 
 def write_benchmark(
-    out: Path, name: str, title: str, tables: Mapping[str, Table], notes: Sequence[str] = ()
+    out: Path,
+    name: str,
+    title: str,
+    tables: Mapping[str, Table],
+    notes: Sequence[str] = (),
+    figures: Sequence[str] = (),
 ) -> None:
     """Write the ``tables`` (heading to rows, all rows of a table with the same keys).
 
-    The CSV holds the last table, which is the one with a row per case.
+    The CSV holds the last table, which is the one with a row per case. ``figures`` are SVG.
     """
     out.mkdir(parents=True, exist_ok=True)
     content = {"benchmark": name, "notes": list(notes), "tables": tables}
@@ -36,7 +41,7 @@ def write_benchmark(
     words = "".join(f"<p>{html.escape(note)}</p>" for note in notes)
     page = (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
-        f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1>{words}{body}</html>\n"
+        f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1>{words}{''.join(figures)}{body}</html>\n"
     )
     (out / f"{name}.html").write_text(page, encoding="utf-8")
 

@@ -12,6 +12,7 @@ from defras_bt.benchmark.planner import planning_times
 from defras_bt.cli.benchmark_executive import executive
 from defras_bt.cli.benchmark_faults import faults
 from defras_bt.cli.benchmark_retraction import table1, table2
+from defras_bt.cli.benchmark_tissue import tissue
 from defras_bt.cli.files import find_scene, folder_for
 
 app = typer.Typer(help="Measure, and leave a JSON, a CSV and a page.", no_args_is_help=True)
@@ -26,6 +27,7 @@ app.command("executive")(executive)
 app.command("table1")(table1)
 app.command("table2")(table2)
 app.command("faults")(faults)
+app.command("tissue")(tissue)
 
 
 @app.command("planner")
