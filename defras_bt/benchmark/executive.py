@@ -155,9 +155,7 @@ class _Rig:
         world = _TimedWorld(scene, twin.state.surface, self._outside)
         monitor = _TimedMonitor(scene, self._monitoring)
         context: Context = replace(bench.context, twin=twin, monitor=monitor)
-        perception = Perception(
-            bench.board, twin, monitor, bench.keyframes, 1.0, operator_stop=lambda: None
-        )
+        perception = Perception(bench.board, twin, monitor, bench.keyframes, 1.0)
         self._notes = _Notes()
         timed = [_TimedRecorder(r, self._recording[type(r).__name__]) for r in recorders]
         self._recorder = CompositeRecorder([self._notes, *timed])
