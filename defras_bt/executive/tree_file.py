@@ -34,7 +34,7 @@ from defras_bt.executive.tree_kinds import KINDS, Kind
 from defras_bt.executive.tree_port_flow import unwritten_reads
 from defras_bt.executive.tree_ports import Wiring
 from defras_bt.executive.tree_spec import NodeSpec, Place, Scope, TreeSpec, Wire
-from defras_sim.yaml_source import Fault, InvalidFile, Location, read_yaml
+from defras_sim.yaml_source import Fault, InvalidFile, Location, YamlSource, read_yaml
 
 _DEEPEST = 64
 """Levels of nesting, includes counted; deeper is a mistake, and would exhaust Python's stack."""
@@ -50,8 +50,14 @@ def read_tree(file: Path, registry: Registry = NODES, *, must_be_guarded: bool =
         InvalidFile: with everything that is wrong with any of the files. Whether motion is guarded
             is said once all nodes are understood.
     """
-    faults: list[Fault] = []
-    source = read_yaml(file)
+    return tree_from(read_yaml(file), registry, must_be_guarded=must_be_guarded)
+
+
+def tree_from(
+    source: YamlSource, registry: Registry = NODES, *, must_be_guarded: bool = True
+) -> TreeSpec:
+    """As :func:`read_tree`, of a file that was read already, or of what another format says."""
+    file, faults = source.file, list[Fault]()
     tree = _Reader(source, faults, registry=registry, including=(file.resolve(),)).tree()
     if tree is not None and not faults:
         tree = Wiring(faults).wired(tree)
