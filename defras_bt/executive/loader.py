@@ -50,17 +50,20 @@ def load_tree(file: Path, context: Context, registry: Registry = NODES) -> Loade
         InvalidFile: with everything that is wrong with the file and those it includes, or with the
             ports that only a tree that includes this one can fill.
     """
-    tree = read_tree(file, registry)
+    return build_tree(read_tree(file, registry), context)
+
+
+def build_tree(tree: TreeSpec, context: Context) -> LoadedTree:
+    """Make the behaviours of a tree that was read and checked, and give its ports their values.
+
+    Raises:
+        InvalidFile: the tree needs values that only a tree that includes it can give.
+    """
     if tree.needs:
         raise InvalidFile(
             Fault(*place, f"port {key!r} has no value: this tree can only be included by another")
             for key, place in tree.needs.items()
         )
-    return build_tree(tree, context)
-
-
-def build_tree(tree: TreeSpec, context: Context) -> LoadedTree:
-    """Make the behaviours of a tree that was read and checked, and give its ports their values."""
     for key, value in tree.values.items():
         context.board.ports.write(key, value)
     root = _build(tree.root, context)
