@@ -81,17 +81,14 @@ def _set_up(tissue: Tissue, name: str, description: str) -> Scene:
         x, y, z = position_m
         return round(scale * x, 4), round(scale * y, 4), round(scale * z + top_m, 4)
 
+    def aside(position_m: tuple[float, float, float]) -> tuple[float, float, float]:
+        # Instruments do not grow with the tissue: arms move apart and up, no farther away.
+        x, y, z = position_m
+        return x, round(scale * y, 4), round(z + top_m, 4)
+
     arms: dict[ArmName, Arm] = {
         arm: part.model_copy(
-            update={
-                # The instrument's length does not grow with the tissue.
-                "rcm_m": (part.rcm_m[0], round(scale * part.rcm_m[1], 4), part.rcm_m[2] + top_m),
-                "home_tip_m": (
-                    part.home_tip_m[0],
-                    round(scale * part.home_tip_m[1], 4),
-                    part.home_tip_m[2] + top_m,
-                ),
-            }
+            update={"rcm_m": aside(part.rcm_m), "home_tip_m": aside(part.home_tip_m)}
         )
         for arm, part in ARMS.items()
     }

@@ -25,6 +25,7 @@ REAL = ["A", "B", "C"]
 VARIANTS = [f"{base}_{kind}" for base in SIMULATED for kind in ("fewer", "more")]
 VARIANTS += [f"{base}_{kind}" for base in REAL for kind in ("fewer", "more", "equal")]
 DEMO = ["demo", "demo_actual"]
+ANATOMY = ["flap", "flap_actual"]
 SOLUTIONS = json.loads((Path(__file__).parent / "solutions.json").read_text())
 
 
@@ -34,10 +35,10 @@ def shipped(name: str) -> Scene:
 
 def test_exactly_the_promised_scenes_are_shipped() -> None:
     found = {file.stem for file in FOLDER.glob("*.yaml")}
-    assert found == {*SIMULATED, *REAL, *VARIANTS, *DEMO}
+    assert found == {*SIMULATED, *REAL, *VARIANTS, *DEMO, *ANATOMY}
 
 
-@pytest.mark.parametrize("name", [*SIMULATED, *REAL, *VARIANTS, *DEMO])
+@pytest.mark.parametrize("name", [*SIMULATED, *REAL, *VARIANTS, *DEMO, *ANATOMY])
 def test_a_scene_has_its_file_s_name_and_connected_patches(name: str) -> None:
     scene = shipped(name)
     assert scene.name == name
@@ -89,3 +90,12 @@ def test_the_scenes_differ_in_layout_and_region() -> None:
     apart = np.linalg.norm(regions[:, None] - regions[None], axis=-1)
     assert np.median(apart) > 0.02
     assert len({shipped(name).attachments.map for name in [*SIMULATED, *REAL]}) == 11
+
+
+@pytest.mark.parametrize("name", ANATOMY)
+def test_the_flap_hides_its_region_at_rest(name: str) -> None:
+    scene = shipped(name)
+    state = TissueModel(scene.simulated).solve({})
+    assert state.converged
+    assert roi_visibility(scene, RayCaster(state.surface)) == 0.0
+    assert scene.tissue.shape == shipped("flap").tissue.shape
