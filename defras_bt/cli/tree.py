@@ -9,6 +9,7 @@ import typer
 
 from defras_bt.cli.errors import ExitCode, UserError
 from defras_bt.cli.files import find, folder_for
+from defras_bt.cli.tree_coverage import coverage
 from defras_bt.cli.tree_groot import export_groot, import_groot
 from defras_bt.executive.proof.as_json import proof_json
 from defras_bt.executive.proof.prover import prove
@@ -22,6 +23,7 @@ from defras_bt.executive.tree_show import Outline, outline_of_spec, show_mermaid
 app = typer.Typer(help="Look at behaviour trees, check and prove them.", no_args_is_help=True)
 Tree = Annotated[str, typer.Argument(help="Tree: a file, or a shipped name.")]
 
+app.command("coverage")(coverage)
 app.command("export-groot")(export_groot)
 app.command("import-groot")(import_groot)
 

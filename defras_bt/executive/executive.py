@@ -79,7 +79,8 @@ class Executive:
         self._over_before = False
         self._stopped_before: tuple[str, ...] = ()
         self._refused_since_s: float | None = None
-        self._last: TickRecord | None = None
+        self.last: TickRecord | None = None
+        """The record of the latest tick."""
 
     def watch(self, visitor: VisitorBase) -> None:
         """Let ``visitor`` see every node of the tree as it is ticked."""
@@ -229,10 +230,10 @@ class Executive:
         known = self._known(inputs, sent)
         why = self._why.event(known, self.tree.kinds)
         events = known.events if why is None else (*known.events, why)
-        self._last = replace(
+        self.last = replace(
             known, true_force_n=true_force_n, true_surface=true_surface, events=events
         )
-        self._recorder.tick(self._last)
+        self._recorder.tick(self.last)
 
     def _known(self, inputs: TickInputs, sent: Command) -> TickRecord:
         """The tick as the executive knows it; what is true only the world knows."""
@@ -268,7 +269,7 @@ class Executive:
     def _record_failure(self, sentence: str) -> None:
         """One more record, with what the broken tick told, so that nobody has to guess."""
         board = self._board
-        last = self._last or self._known(board.inputs, HOLD)
+        last = self.last or self._known(board.inputs, HOLD)
         untold = board.events if board.inputs.tick > last.tick else ()
         event = Event(last.time_s, "error", "error", sentence)
         ended = board.outcome_cause

@@ -1,7 +1,7 @@
 """Which node of BehaviorTree.CPP 4 does what each inner node of a tree file does.
 
-Only those that show the same status for the same answers in every tick stand here, checked against
-the sources of version 4.6. The rest goes under names of its own, so that nobody runs a tree that
+Only those that show the same status for the same answers in every tick stand here, as the sources
+of version 4 have them. The rest goes under names of its own, so that nobody runs a tree that
 looks the same and does something else.
 """
 
