@@ -74,7 +74,7 @@ def test_the_grasped_patch_moves_rigidly_with_the_tip():
     tissue = model()
     turned = at(0.05, 0.0, 0.03, turn=(0.2, -0.6, 0.3))
     retract(tissue, GRASP, LIFTED, turned)
-    grasp = tissue._grasps["psm1"]
+    grasp = tissue.snapshot().grasps["psm1"]
     held = grasp.term("psm1").pulls(tissue.snapshot().positions_m).held_m
     np.testing.assert_allclose(held, grasp.targets_m, atol=5e-5)
     at_rest = grasp.springs.rows @ tissue.mesh.nodes_m
@@ -93,7 +93,7 @@ def test_the_nearest_patch_is_taken_in_the_deformed_state():
     surface = tissue.solve({"psm1": FOLDED}).surface
     target = surface.vertices_m[surface.upper][25 * 18 + 10]
     tissue.grasp("psm2", Pose(target + [0.0, 0.0, 0.001]))
-    held = tissue._grasps["psm2"].springs.rows @ tissue.snapshot().positions_m
+    held = tissue.snapshot().grasps["psm2"].springs.rows @ tissue.snapshot().positions_m
     assert np.linalg.norm(held[0] - target) < 0.002
 
 
@@ -231,7 +231,7 @@ def test_a_patch_taken_while_deformed_knows_where_it_rests():
     surface = tissue.solve({"psm1": FOLDED}).surface
     taken = Pose(surface.vertices_m[surface.upper][25 * 18 + 10])
     tissue.grasp("psm2", taken)
-    rest_tip = tissue._grasps["psm2"].unloaded_tip(tissue.rest_m)
+    rest_tip = tissue.snapshot().grasps["psm2"].unloaded_tip(tissue.rest_m)
     np.testing.assert_allclose(rest_tip.position_m, [-0.01, 0.03, 0.0], atol=1e-3)
 
 
