@@ -3,6 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from defras_sim.scene import Tissue
+from defras_sim.tissue.dent import Dent
 from defras_sim.tissue.discs import disc_rows, net_force
 from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.mesh import slab_mesh
@@ -70,3 +71,38 @@ def test_gradient_and_tangent_are_slopes():
     np.testing.assert_allclose(
         tangent @ step.ravel() * 2, (up_slope - down_slope).ravel(), atol=1e-12
     )
+
+
+def test_gradient_tangent_and_what_stiffness_does_are_slopes_with_dents_too():
+    mesh = slab((4, 4, 1))
+    rng = np.random.default_rng(0)
+    dent = Dent(rng.uniform(0.0, 0.05, 6), rng.uniform(0.02, 0.3, 6))
+    centers = np.concatenate([CENTER, -CENTER])
+    rows = disc_rows(mesh, centers, 0.004, SLAB.lower)
+    springs = Springs(rows, np.array([300.0, 300.0, 300.0, 1e4, 1e4, 0.0]), dent)
+    targets = rows @ mesh.nodes_m + rng.normal(0, 0.003, (6, 3))
+    x = mesh.nodes_m + rng.normal(0, 0.001, mesh.nodes_m.shape)
+    term = SpringTerm("held", springs, targets)
+    step = rng.normal(0, 1e-7, x.shape)
+    (up, up_slope), (down, down_slope) = (term.energy_and_gradient(x + s) for s in (step, -step))
+    _, slope = term.energy_and_gradient(x)
+    assert np.sum(slope * step) * 2 == pytest.approx(up - down, rel=1e-6)
+    tangent = PotentialEnergy(len(x), [term]).tangent(x)
+    change = (up_slope - down_slope).ravel()
+    np.testing.assert_allclose(tangent @ step.ravel() * 2, change, atol=1e-6 * abs(change).max())
+    np.testing.assert_allclose((tangent - tangent.T).toarray(), 0, atol=1e-12)
+    firmer, looser = (
+        Springs(rows, springs.stiffness_n_per_m + s, dent).forces(x, targets) for s in (1e-4, 0.0)
+    )
+    by_stiffness = springs.pulls(x, targets).forces_by_stiffness
+    np.testing.assert_allclose((firmer - looser) / 1e-4, by_stiffness, rtol=1e-3, atol=1e-12)
+
+
+def test_the_held_disc_lies_where_its_own_spring_pulls_it():
+    """Dent and spring share the stretch: the spring's part is its force over its stiffness."""
+    mesh = slab((4, 4, 1))
+    rows = disc_rows(mesh, CENTER, 0.004, SLAB.upper)
+    springs = Springs(rows, np.full(3, 80.0), Dent(np.full(3, 0.03), np.full(3, 0.1)))
+    targets = rows @ mesh.nodes_m + [0.001, 0.0, 0.004]
+    pulls = springs.pulls(mesh.nodes_m, targets)
+    np.testing.assert_allclose(pulls.forces_n, 80.0 * (targets - pulls.held_m), atol=1e-12)

@@ -1,0 +1,67 @@
+"""What meshes miss of a disc's dent: it makes coarse meshes agree, and vanishes on fine ones."""
+
+import numpy as np
+import pytest
+
+from defras_sim.geometry import Pose
+from defras_sim.scene import Attachments, Roi, Scene, Tissue
+from defras_sim.tissue.mesh import slab_mesh
+from defras_sim.tissue.model import TissueModel
+from defras_sim.tissue.unresolved import DentsOf
+
+INSIDE = np.array([[-0.005, -0.005]])
+
+
+def dents(cells, tissue=None, element="hexahedron20", material="neo_hookean"):
+    tissue = tissue or Tissue()
+    return DentsOf(slab_mesh(tissue, element, cells), tissue, material)
+
+
+def test_the_finer_the_mesh_the_less_is_missing():
+    missing = [
+        dents(cells).at(INSIDE, 0.003, upper=False).give_m_per_n[0]
+        for cells in ((6, 6, 1), (12, 12, 1), (16, 16, 2), (24, 24, 2))
+    ]
+    assert np.all(np.diff(missing) < 0)
+    assert missing[-1] < 0.25 * missing[0]
+
+
+def test_softer_tissue_gives_way_further_in_proportion():
+    plain = dents((8, 8, 1)).at(INSIDE, 0.003, upper=False)
+    soft = dents((8, 8, 1), Tissue(young_modulus_pa=1500.0)).at(INSIDE, 0.003, upper=False)
+    np.testing.assert_allclose(soft.give_m_per_n, 2 * plain.give_m_per_n)
+    np.testing.assert_allclose(soft.hardening_n, plain.hardening_n / 2)
+
+
+def test_mirror_images_and_exchanged_axes_are_alike():
+    places = np.array([[-0.055, 0.005], [0.055, -0.005], [0.005, -0.055]])
+    give = dents((12, 12, 1)).at(places, 0.003, upper=False).give_m_per_n.reshape(3, 3)
+    np.testing.assert_allclose(give[0], give[1])
+    # With the axes, the moments along them change places.
+    np.testing.assert_allclose(give[0], give[2][[0, 2, 1]], rtol=1e-6)
+
+
+def test_linear_tetrahedra_keep_their_faults():
+    found = dents((12, 12, 1), element="tetrahedron4").at(INSIDE, 0.003, upper=False)
+    assert not found.give_m_per_n.any()
+
+
+@pytest.mark.parametrize("material", ["neo_hookean", "corotational"])
+def test_the_first_millimetres_of_a_lift_do_not_depend_on_the_mesh(material):
+    """5x7x1, 8x8x1 and 12x12x1 elements agree with 16x16x2; without dents they are far off."""
+    scene = Scene(
+        name="two edges",
+        attachments=Attachments(map=("#..........#",) * 12),
+        roi=Roi(center_x_m=0.0, center_y_m=0.0),
+        tissue=Tissue(bed=False),
+    )
+    start = Pose(np.array([0.025, 0.025, 0.0]))
+    forces = []
+    for cells in ((16, 16, 2), (5, 7, 1), (8, 8, 1), (12, 12, 1)):
+        tissue = TissueModel(scene, elements_xyz=cells, material=material)
+        tissue.grasp("psm1", start)
+        state = tissue.solve({"psm1": start.moved(np.array([0.0, 0.0, 0.004]))})
+        assert state.converged
+        forces.append(np.linalg.norm(state.grasp_forces_n["psm1"]))
+    np.testing.assert_allclose(forces[1], forces[0], rtol=0.25)
+    np.testing.assert_allclose(forces[2:], forces[0], rtol=0.05)
