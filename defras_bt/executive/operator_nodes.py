@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from py_trees.common import Status
 
@@ -20,6 +20,12 @@ class OperatorHolds(Node):
 
     role: ClassVar[Role] = "guard"
 
+    @classmethod
+    def promise(cls, parameters: Any, variable: str, value: str) -> Status | None:
+        if variable != "operator":
+            return None
+        return Status.SUCCESS if value in ("pauses", "drives") else Status.FAILURE
+
     def update(self) -> Status:
         operator = self.context.board.inputs.operator
         if not operator.holds:
@@ -32,6 +38,12 @@ class WaitForOperator(Node):
     """Hold still, with the grip kept, for as long as the operator wants."""
 
     role: ClassVar[Role] = "task"
+
+    @classmethod
+    def promise(cls, parameters: Any, variable: str, value: str) -> Status | None:
+        if variable != "operator":
+            return None
+        return Status.RUNNING if value in ("pauses", "drives") else Status.SUCCESS
 
     def update(self) -> Status:
         operator = self.context.board.inputs.operator

@@ -64,7 +64,7 @@ class OperatorPermits(Guard):
 
     @classmethod
     def promise(cls, parameters: Any, variable: str, value: str) -> Status | None:
-        return Status.FAILURE if (variable, value) == ("operator", "stops") else None
+        return Status.FAILURE if variable == "operator" and value != "permits" else None
 
     def update(self) -> Status:
         board = self.context.board

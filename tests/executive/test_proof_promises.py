@@ -36,11 +36,10 @@ def warning(state: int | None) -> Situation:
 SITUATIONS: dict[tuple[str, str], list[Situation]] = {
     ("readings", "fresh"): [says(missing=())],
     ("readings", "missing"): [says(missing=("no cloud",)), says(missing=("a", "b"))],
-    ("operator", "silent"): [says(operator=NOBODY)],
-    ("operator", "stops"): [
-        says(operator=OperatorState(mode, "the pedal was pressed"))
-        for mode in (Mode.STOPPED, Mode.PAUSED, Mode.TAKEN_OVER)
-    ],
+    ("operator", "permits"): [says(operator=NOBODY)],
+    ("operator", "pauses"): [says(operator=OperatorState(Mode.PAUSED, "a pause was asked for"))],
+    ("operator", "drives"): [says(operator=OperatorState(Mode.TAKEN_OVER, "the arms are driven"))],
+    ("operator", "stops"): [says(operator=OperatorState(Mode.STOPPED, "the pedal was pressed"))],
     ("force", "tolerable"): [force_for(0.0, 0.1), force_for(0.3)],
     ("force", "dangerous"): [
         force_for(LONGEST_PATIENCE_S),
@@ -73,6 +72,8 @@ def test_every_value_of_the_world_is_tried():
 KNOWING = {
     "SensorsFresh": "readings",
     "OperatorPermits": "operator",
+    "OperatorHolds": "operator",
+    "WaitForOperator": "operator",
     "ForceAccepted": "force",
     "WarningBelow": "warning",
     "WarningReached": "warning",

@@ -57,8 +57,20 @@ CLAIMS: tuple[Claim, ...] = (
     ),
     Claim(
         "operator_stops",
-        "while the operator stops, pauses or drives nothing is commanded",
+        "in the tick in which the operator stops nothing is commanded",
         ("operator", "stops"),
+        "command",
+    ),
+    Claim(
+        "operator_pauses",
+        "while the operator pauses the operation nothing is commanded",
+        ("operator", "pauses"),
+        "command",
+    ),
+    Claim(
+        "operator_drives",
+        "from the operator's taking over to the handing back nothing is commanded",
+        ("operator", "drives"),
         "command",
     ),
     Claim(
