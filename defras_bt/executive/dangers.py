@@ -10,7 +10,8 @@ WORLD: dict[str, tuple[str, ...]] = {
 }
 """What leaves may ask about in a tick, and what it may be. It is the same for all leaves of a tick.
 
-The operator drives after having taken over the arms. The force is dangerous where it is unknown, or was over its threshold for ``LONGEST_PATIENCE_S``.
+The operator drives after having taken over the arms. The force is dangerous where it is unknown, or
+was over its threshold for ``LONGEST_PATIENCE_S``.
 """
 
 LONGEST_PATIENCE_S = 1.0
