@@ -76,15 +76,21 @@ def new(
 
     Writes seedN.yaml (believed) and seedN_fewer.yaml (actual; or _more, _equal). Only scenes are
     kept in which somebody who knows the attachments can expose the region; finding one takes up to
-    several minutes.
+    several minutes, and each draw is told.
 
     Example: defras scene new --seed 7 --actual more -o scenes
     """
     console = Console(soft_wrap=True, highlight=False)
     folder_for(out)
-    with console.status("drawing scenes and rehearsing retractions"):
+    with console.status("drawing scenes and rehearsing retractions") as status:
+
+        def tell(sentence: str) -> None:
+            status.update(sentence)
+            if not console.is_terminal:
+                console.print(sentence, markup=False)
+
         try:
-            generated = generate_scene(seed, actual.value)
+            generated = generate_scene(seed, actual.value, tell=tell)
         except NoScene as error:
             raise UserError(str(error)) from error
     believed, truth = generated.believed.scene, generated.actual.scene

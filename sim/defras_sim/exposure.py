@@ -34,12 +34,17 @@ def promising_points(scene: Scene) -> list[GraspPoint]:
     return sorted(scene.grasp_points, key=lambda point: (-promise_m(point), point))
 
 
-def best_rehearsals(scene: Scene, points: Sequence[GraspPoint]) -> Iterator[Rehearsal]:
+def best_rehearsals(
+    scene: Scene, points: Sequence[GraspPoint], most_force_n: float = np.inf
+) -> Iterator[Rehearsal]:
     """For each point the rehearsal that shows most of the region, over :data:`SEQUENCES`.
 
-    A point is done as soon as one sequence exposes the region.
+    A point is done as soon as one sequence exposes the region. Sequences are followed up to
+    ``most_force_n``: of tissue that is held firmly, most need not be gone through.
     """
-    rehearser = Rehearser(scene, step_m=SCREENING_STEP_M, stop_when_exposed=True)
+    rehearser = Rehearser(
+        scene, step_m=SCREENING_STEP_M, stop_when_exposed=True, most_force_n=most_force_n
+    )
     for point in points:
         best = rehearser.run(point, SEQUENCES[0])
         for sequence in SEQUENCES[1:]:
@@ -65,7 +70,7 @@ def find_exposing(scene: Scene, most_points: int = 10) -> Rehearsal | None:
     )
     reality = on_mesh(stricter, scene.simulation.elements_xyz)
     coarse = on_mesh(stricter, SCREENING_ELEMENTS_XYZ)
-    for found in best_rehearsals(coarse, promising_points(scene)[:most_points]):
+    for found in best_rehearsals(coarse, promising_points(scene)[:most_points], force_n):
         if found.best_visibility >= wanted and found.force_max_n <= force_n:
             rehearser = Rehearser(reality, step_m=SCREENING_STEP_M, stop_when_exposed=True)
             confirmed = rehearser.run(found.point, found.manoeuvres)

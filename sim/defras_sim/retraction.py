@@ -88,9 +88,16 @@ class Rehearser:
     """Rehearses many retractions of one scene; what two of them have in common is solved once."""
 
     def __init__(
-        self, scene: Scene, *, step_m: float = 0.003, stop_when_exposed: bool = False
+        self,
+        scene: Scene,
+        *,
+        step_m: float = 0.003,
+        stop_when_exposed: bool = False,
+        most_force_n: float = np.inf,
     ) -> None:
+        """A retraction ends with the step whose grasp force is above ``most_force_n``."""
         self._scene = scene
+        self._most_force_n = most_force_n
         self._step_m = step_m
         self._enough = scene.thresholds.roi_visibility if stop_when_exposed else np.inf
         self._model = TissueModel(scene, residual_share=_RESIDUAL_SHARE)
@@ -107,6 +114,8 @@ class Rehearser:
         result = self._known[done][1]
         for manoeuvre in manoeuvres:
             if not result.finished or result.best_visibility >= self._enough:
+                break
+            if result.force_max_n > self._most_force_n:
                 break
             ahead = (*done, manoeuvre)
             if ahead not in self._known:
@@ -143,7 +152,7 @@ class Rehearser:
             seen = roi_visibility(self._scene, RayCaster(state.surface))
             if seen > best:
                 best, best_at_m = seen, tip_m
-            if seen >= self._enough:
+            if seen >= self._enough or force_n > self._most_force_n:
                 break
         return Rehearsal(
             arm=before.arm,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -50,21 +51,32 @@ class GeneratedScene:
 
 
 def generate_scene(
-    seed: int, relation: Relation = "fewer", *, layout: str | None = None
+    seed: int,
+    relation: Relation = "fewer",
+    *,
+    layout: str | None = None,
+    tell: Callable[[str], None] = lambda sentence: None,
 ) -> GeneratedScene:
     """The first draw of ``seed`` that can be exposed as believed and as it really is.
+
+    ``tell`` hears what became of each draw: each costs some seconds of rehearsing.
 
     Raises:
         NoScene: no draw can be; another seed or layout may do.
     """
     rng = np.random.default_rng(seed)
-    for _ in range(_MOST_BELIEFS):
-        believed = solve(draw_believed(rng, name=f"seed{seed}", layout=layout))
+    for number in range(1, _MOST_BELIEFS + 1):
+        drawn = draw_believed(rng, name=f"seed{seed}", layout=layout)
+        said = f"draw {number}: {drawn.description.removeprefix('Believed: ').removesuffix('.')}"
+        believed = solve(drawn)
         if believed is None:
+            tell(f"{said}: cannot be exposed")
             continue
+        tell(f"{said}: can be exposed; looking for what is really there")
         actual = solved_actual(believed, relation, rng)
         if actual is not None:
             return GeneratedScene(believed, actual)
+        tell(f"{said}: nothing with {relation} attachments can be exposed")
     raise NoScene(f"seed {seed}: none of {_MOST_BELIEFS} draws can be exposed; try another seed")
 
 

@@ -52,7 +52,10 @@ def test_the_same_seed_draws_the_same() -> None:
 
 
 def test_a_kept_scene_can_be_exposed_by_somebody_who_knows() -> None:
-    made = generate_scene(3, "more", layout="corner")
+    heard: list[str] = []
+    made = generate_scene(3, "more", layout="corner", tell=heard.append)
+    assert heard[0].startswith("draw 1: ")
+    assert "can be exposed; looking for what is really there" in heard[-1]
     assert made.believed.scene.attached.sum() < made.actual.scene.attached.sum()
     for solved in (made.believed, made.actual):
         solution = solved.solution
