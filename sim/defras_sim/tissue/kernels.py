@@ -1,4 +1,4 @@
-"""Loops over elements and quadrature points, compiled.
+"""Loops over elements and quadrature points, compiled: the base material.
 
 ``gradients`` (elements, points, 3, nodes of an element) are rest gradients of shape functions,
 ``volumes`` (elements, points) rest volumes, ``mu`` and ``lam`` (elements, points) the material's

@@ -5,6 +5,9 @@ material does not exist (neo-Hookean at J <= 0). The tangent is ``A[3 i + J, 3 k
 
 - corotational: mu |F - R|^2 + lambda/2 (tr(R^T F) - 3)^2, F = R S.
   Stomakhin et al., Energetically consistent invertible elasticity, SCA 2012 (unmodified form).
+  Stretched to more than twice its length it turns inside out across, as no tissue does, and its
+  energy has an edge where two principal stretches add up to zero; see
+  :mod:`defras_sim.tissue.collapsed`.
 - neo_hookean: mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2. Bonet and Wood, 2nd ed., eq. 6.28.
 - stable_neo_hookean: mu/2 (I_C - 3) + lambda/2 (J - alpha)^2 - mu/2 ln(I_C + 1),
   alpha = 1 + 3/4 mu/lambda. Smith, de Goes, Kim, ACM TOG 37 (2018) 12, and PyBullet.
@@ -18,6 +21,7 @@ import numpy as np
 
 from defras_sim.geometry import Floats
 from defras_sim.scene import MaterialName
+from defras_sim.tissue import collapsed
 from defras_sim.tissue.matrices import cofactor, jit, rotation
 
 CODES: dict[MaterialName, int] = {"corotational": 0, "neo_hookean": 1, "stable_neo_hookean": 2}
@@ -57,6 +61,8 @@ def lame_by_poisson(material: MaterialName, mu: Floats, lam: Floats) -> tuple[Fl
 def stress(code: int, F: Floats, mu: float, lam: float, P: Floats) -> float:
     """Write the first Piola stress to ``P`` (3, 3); return the energy density [J/m^3]."""
     if code == 0:
+        if collapsed.is_near(F):
+            return collapsed.stress(F, mu, lam, P)
         R = np.empty((3, 3))
         rotation(F, R)
         excess = -3.0
@@ -98,7 +104,10 @@ def tangent(code: int, F: Floats, mu: float, lam: float, A: Floats) -> None:
     """Write dP/dF to ``A`` (9, 9)."""
     B = np.empty((3, 3))
     if code == 0:
-        _corotational_tangent(F, mu, lam, A, B)
+        if collapsed.is_near(F):
+            collapsed.tangent(F, mu, lam, A)
+        else:
+            _corotational_tangent(F, mu, lam, A, B)
         return
     J = cofactor(F, B)
     trace = 0.0
@@ -160,10 +169,6 @@ def _corotational_tangent(F: Floats, mu: float, lam: float, A: Floats, R: Floats
         G[i, i] += trace
     H = np.empty((3, 3))
     determinant = cofactor(G, H)
-    # sigma_i + sigma_j = 0 is a fold of the polar decomposition; keep its slope finite.
-    limit = 1e-6
-    if abs(determinant) < limit:
-        determinant = limit if determinant >= 0 else -limit
     factor = lam * (trace - 3) - 2 * mu
     # W[3 i + j, a]: R [e_a] component, the rotation's change for a unit axial vector e_a.
     W = np.empty((9, 3))

@@ -29,32 +29,70 @@ def cofactor(F: Floats, out: Floats) -> float:
 
 
 @jit
-def _rotation_by_singular_vectors(F: Floats, R: Floats) -> None:
+def singular_frames(F: Floats, U: Floats, V: Floats, sigma: Floats) -> None:
+    """Write F = U diag(sigma) V^T, both frames right-handed, sigma[0] >= sigma[1] >= |sigma[2]|.
+
+    The last singular value has the sign of det F.
+    """
     C = np.empty((3, 3))
-    V = np.eye(3)
+    W = np.eye(3)
     for i in range(3):
         for j in range(3):
             C[i, j] = F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]
-    jacobi_eigen(C, V)
-    # Columns F v are orthogonal; take the two longest and complete them right-handedly.
-    small = 0
+    jacobi_eigen(C, W)
+    largest = smallest = 0
     for i in range(1, 3):
-        if C[i, i] < C[small, small]:
-            small = i
-    a, b = (small + 1) % 3, (small + 2) % 3
-    U = np.empty((3, 3))
-    for column in (a, b):
-        norm = 0.0
+        if C[i, i] > C[largest, largest]:
+            largest = i
+        if C[i, i] <= C[smallest, smallest]:
+            smallest = i
+    if largest == smallest:
+        largest, smallest = 0, 2
+    for i in range(3):
+        V[i, 0], V[i, 1] = W[i, largest], W[i, 3 - largest - smallest]
+    _complete(V)
+    for column in range(2):
         for i in range(3):
             U[i, column] = F[i, 0] * V[0, column] + F[i, 1] * V[1, column] + F[i, 2] * V[2, column]
-            norm += U[i, column] ** 2
-        norm = math.sqrt(norm)
+    _orthonormal(U)
+    _complete(U)
+    for k in range(3):
+        sigma[k] = 0.0
         for i in range(3):
-            U[i, column] /= norm
+            for j in range(3):
+                sigma[k] += U[i, k] * F[i, j] * V[j, k]
+
+
+@jit
+def _orthonormal(U: Floats) -> None:
+    """Make the first two columns orthonormal; where one vanishes, any direction will do."""
+    for column in range(2):
+        for attempt in range(4):
+            if column == 1:
+                along = U[0, 0] * U[0, 1] + U[1, 0] * U[1, 1] + U[2, 0] * U[2, 1]
+                for i in range(3):
+                    U[i, 1] -= along * U[i, 0]
+            norm = math.sqrt(U[0, column] ** 2 + U[1, column] ** 2 + U[2, column] ** 2)
+            if norm > 1e-14:
+                for i in range(3):
+                    U[i, column] /= norm
+                break
+            for i in range(3):
+                U[i, column] = 1.0 if i == attempt else 0.0
+
+
+@jit
+def _complete(U: Floats) -> None:
+    """Write the cross product of the first two columns to the third."""
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        U[i, small] = U[j, a] * U[k, b] - U[k, a] * U[j, b]
-    # V stays right-handed: it is a product of rotations.
+        U[i, 2] = U[j, 0] * U[k, 1] - U[k, 0] * U[j, 1]
+
+
+@jit
+def _rotation_by_singular_vectors(F: Floats, R: Floats) -> None:
+    U, V, sigma = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    singular_frames(F, U, V, sigma)
     for i in range(3):
         for j in range(3):
             R[i, j] = U[i, 0] * V[j, 0] + U[i, 1] * V[j, 1] + U[i, 2] * V[j, 2]
