@@ -78,16 +78,20 @@ class Wiring:
     values: dict[str, Any] = field(default_factory=dict)
     needed: dict[str, Place] = field(default_factory=dict)
     uses: list[Use] = field(default_factory=list)
+    declared: list[tuple[Place, str]] = field(default_factory=list)
 
     def wired(self, tree: TreeSpec) -> TreeSpec:
         """The tree with the keys of every port."""
         root = self._node(tree.root, tree.root.name, _Surroundings("", {}))
+        self._know_types(root)
         self._compare_types()
         return replace(tree, root=root, values=self.values, needs=self.needed)
 
     def _node(self, spec: NodeSpec, path: str, here: _Surroundings) -> NodeSpec:
-        for scope in spec.scopes:
-            here = self._enter(scope, path, here)
+        for depth, scope in enumerate(spec.scopes, 1):
+            # A file that only includes another has its topmost node in common with it, but no keys.
+            prefix = "" if scope.given is None else path + "/" * depth
+            here = self._enter(scope, prefix, here)
         children = tuple(self._node(c, f"{path}/{c.name}", here) for c in spec.children)
         keys = {}
         if spec.node_class is not None:
@@ -116,9 +120,8 @@ class Wiring:
         self.uses.append(Use(key, type_name, port.direction, wire.place, who))
         return key
 
-    def _enter(self, scope: Scope, path: str, outer: _Surroundings) -> _Surroundings:
+    def _enter(self, scope: Scope, prefix: str, outer: _Surroundings) -> _Surroundings:
         """The surroundings inside a file, once its declared ports are led outside."""
-        prefix = f"{path}/" if scope.given is not None else ""
         leads = {}
         given = scope.given or {}
         for name, said in given.items():
@@ -138,6 +141,7 @@ class Wiring:
                 leads[name] = outer.key(wire.key)
                 if port.direction == "out" and wire.key in outer.inward:
                     self._fault(wire.place, f"{wire.key!r} is declared `in` and is written here")
+            self.declared.append((place, port.type))
             who = f"{scope.file.name}, port {name!r},"
             self.uses.append(Use(leads[name], port.type, "in", wire.place if wire else place, who))
         inward = frozenset(n for n, (_, port) in scope.declared.items() if port.direction == "in")
@@ -171,6 +175,18 @@ class Wiring:
             self.values[key] = port.checked(wire.value)
         except WrongPortValue as error:
             self._fault(wire.place, str(error))
+
+    def _know_types(self, root: NodeSpec) -> None:
+        """Declared types are those of leaves' ports, or can be written down."""
+        known = set(SCALARS)
+        for _, spec in root.walk():
+            ports = ports_of(spec.node_class) if spec.node_class is not None else {}
+            known |= {port.type_name for port in ports.values() if port.direction != "asked"}
+        for place, type_name in self.declared:
+            if type_name not in known:
+                self._fault(
+                    place, f"there is no type {type_name!r}{did_you_mean(type_name, known)}"
+                )
 
     def _compare_types(self) -> None:
         first: dict[str, Use] = {}

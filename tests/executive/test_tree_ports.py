@@ -173,6 +173,23 @@ def test_each_fault_has_its_place_and_what_would_be_valid(faults_of, children, e
     assert any(expected in fault for fault in faults), faults
 
 
+def test_a_file_that_only_includes_another_has_keys_of_its_own(write_tree):
+    write_tree(
+        "name: inner\nports: {out_n: {type: number, direction: out}}\ntree: {sequence: {children: "
+        "[{Measure: {ports: {tension_n: out_n}}}, {Label: {ports: {label: k}}}]}}",
+        "inner.yaml",
+    )
+    write_tree("name: outer\ntree: {subtree: {file: inner.yaml, ports: {out_n: k}}}", "outer.yaml")
+    tree = read_tree(write_tree("name: toy\ntree: {subtree: {file: outer.yaml}}"), REGISTRY)
+    (measured,), (label,) = (spec.keys.values() for _, spec in tree.root.walk() if spec.keys)
+    assert measured != label
+
+
+def test_a_type_that_is_not_there(faults_of):
+    (fault,) = faults_of("Patient", ports="ports: {a: {type: numbr, direction: in}}\n")
+    assert fault == "tree.yaml:2:9: there is no type 'numbr'; did you mean number?"
+
+
 def test_a_port_that_is_given_is_not_written(faults_of):
     ports = "ports: {tension_n: {type: number, direction: in}}\n"
     (fault,) = faults_of("Measure", ports=ports)
