@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,69 +38,73 @@ def sense(
     """
     if isinstance(observation, SensedObservation):
         return observation
-    taken = {entry.name: getattr(observation, entry.name) for entry in fields(Observation)}
-    sensed = _with_visibility(SensedObservation(**taken), scene, colours)
-    return _with_cloud(sensed, scene, colours)
+    share, stamp_s, unseen = _visibility(observation, scene, colours)
+    cloud, dropped, unmeasured = _cloud(observation, scene, colours)
+    return SensedObservation(
+        time_s=observation.time_s,
+        arms=observation.arms,
+        cloud=cloud,
+        depth_image=observation.depth_image,
+        endoscope_image=observation.endoscope_image,
+        roi_visibility=share,
+        roi_visibility_stamp_s=stamp_s,
+        faults=tuple(fault for fault in (unseen, unmeasured) if fault),
+        dropped_points=dropped,
+    )
 
 
-def _with_cloud(
-    sensed: SensedObservation, scene: Scene, colours: ColourCalibration
-) -> SensedObservation:
-    cloud, image = sensed.cloud, sensed.depth_image
+def _cloud(
+    observation: Observation, scene: Scene, colours: ColourCalibration
+) -> tuple[PointCloud | None, int, str]:
+    """The cloud, how many points were not finite, and why there is no cloud ("" if there is)."""
+    cloud, image = observation.cloud, observation.depth_image
     if cloud is None and image is None:
-        return _faulty(sensed, "no cloud: the world gives neither a cloud nor a depth picture")
+        return None, 0, "no cloud: the world gives neither a cloud nor a depth picture"
     if cloud is None and image is not None:
         try:
             cloud = PointCloud(image.stamp_s, tissue_points_m(image, scene, colours))
         except ValueError as fault:
-            return _faulty(sensed, f"no cloud: {fault}")
+            return None, 0, f"no cloud: {fault}"
     assert cloud is not None
     # Depth cameras measure, and recordings keep, no more than single precision.
     with np.errstate(over="ignore"):  # what is too large for that is dropped as infinite
         points = np.asarray(cloud.points_m, np.float32).astype(np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
-        shape = points.shape
-        return _faulty(
-            replace(sensed, cloud=None), f"no cloud: points of shape {shape}, not (n, 3)"
-        )
+        return None, 0, f"no cloud: points of shape {points.shape}, not (n, 3)"
     finite = np.isfinite(points).all(axis=1)
-    dropped = int(len(points) - finite.sum())
-    if finite.sum() < MIN_CLOUD_POINTS:
+    usable = int(np.count_nonzero(finite))
+    dropped = len(points) - usable
+    if usable < MIN_CLOUD_POINTS:
         reason = (
-            f"no cloud: {int(finite.sum())} usable points on the tissue ({dropped} not finite), "
+            f"no cloud: {usable} usable points on the tissue ({dropped} not finite), "
             f"at least {MIN_CLOUD_POINTS} are needed"
         )
-        return _faulty(replace(sensed, cloud=None, dropped_points=dropped), reason)
+        return None, dropped, reason
     possible = finite & Workspace.of(scene).holds(points)
-    if possible.sum() < finite.sum() / 2:
-        share = possible.sum() / finite.sum()
+    share = np.count_nonzero(possible) / usable
+    if share < 1 / 2:
         reason = (
             f"no cloud: only {share:.0%} of its points lie where tissue can be; it should be in "
             "metres and in the tissue frame"
         )
-        return _faulty(replace(sensed, cloud=None, dropped_points=dropped), reason)
-    sound = PointCloud(cloud.stamp_s, points[possible])
-    return replace(sensed, cloud=sound, dropped_points=dropped)
+        return None, dropped, reason
+    return PointCloud(cloud.stamp_s, points[possible]), dropped, ""
 
 
-def _with_visibility(
-    sensed: SensedObservation, scene: Scene, colours: ColourCalibration
-) -> SensedObservation:
-    value, stamp = sensed.roi_visibility, sensed.roi_visibility_stamp_s
-    image = sensed.endoscope_image
-    unseen = replace(sensed, roi_visibility=None, roi_visibility_stamp_s=None)
+def _visibility(
+    observation: Observation, scene: Scene, colours: ColourCalibration
+) -> tuple[float | None, float | None, str]:
+    """Share of the region that is seen, when, and why nobody knows ("" if known)."""
+    value, stamp = observation.roi_visibility, observation.roi_visibility_stamp_s
+    image = observation.endoscope_image
     if value is None and image is None:
-        return _faulty(unseen, "no visibility: the world gives neither it nor a picture")
+        return None, None, "no visibility: the world gives neither it nor a picture"
     if value is None and image is not None:
         try:
             value, stamp = roi_visibility(image, scene, colours), image.stamp_s
         except ValueError as fault:
-            return _faulty(unseen, f"no visibility: {fault}")
+            return None, None, f"no visibility: {fault}"
     assert value is not None
     if not 0.0 <= value <= 1.0:
-        return _faulty(unseen, f"no visibility: {value} is not between 0 and 1")
-    return replace(sensed, roi_visibility=value, roi_visibility_stamp_s=stamp)
-
-
-def _faulty(sensed: SensedObservation, sentence: str) -> SensedObservation:
-    return replace(sensed, faults=(*sensed.faults, sentence))
+        return None, None, f"no visibility: {value} is not between 0 and 1"
+    return value, stamp, ""
