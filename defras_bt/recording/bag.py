@@ -11,6 +11,7 @@ from defras_bt.recording import ros_messages as ros
 from defras_bt.recording.inputs import INPUTS_TOPIC, SETUP_TOPIC, input_text, setup_text
 from defras_bt.recording.mcap_file import McapFile
 from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
+from defras_sim.geometry import Floats, Pose
 from defras_sim.worlds.protocol import ArmObservation, PointCloud
 
 # A killed process loses at most the messages of so many ticks; see mcap_file for the rest.
@@ -31,6 +32,8 @@ class BagRecorder:
         self._stamps: dict[str, float] = {}
         self._cloud: PointCloud | None = None
         self._clouds = 0
+        self._turned: dict[str, tuple[Floats, Floats]] = {}
+        """Last rotation (3, 3) and quaternion (4,) by topic: arms turn in few ticks."""
 
     def start(self, info: RunInfo) -> None:
         self._file = McapFile(self._path)
@@ -69,7 +72,9 @@ class BagRecorder:
             ("measured_cp", seen.tissue_from_tip),
             ("setpoint_cp", seen.setpoint_tissue_from_tip),
         ):
-            self._write(f"{arm}/{topic}", ros.POSE, now_s, stamp_s, ros.pose_message(stamp_s, pose))
+            turned = self._quaternion_xyzw(f"{arm}/{topic}", pose)
+            message = ros.pose_message(stamp_s, pose, turned)
+            self._write(f"{arm}/{topic}", ros.POSE, now_s, stamp_s, message)
         for topic, joints in (
             ("measured_js", seen.joints),
             ("setpoint_js", seen.setpoint_joints),
@@ -82,6 +87,12 @@ class BagRecorder:
         if seen.grasped is not None:
             message = ros.flag_message(seen.grasped)
             self._write(f"{arm}/grasped", ros.FLAG, now_s, stamp_s, message)
+
+    def _quaternion_xyzw(self, topic: str, pose: Pose) -> Floats:
+        last = self._turned.get(topic)
+        if last is None or not np.array_equal(last[0], pose.rotation):
+            last = self._turned[topic] = (pose.rotation.copy(), pose.quaternion_xyzw)
+        return last[1]
 
     def _write_text(self, topic: str, now_s: float, text: str) -> None:
         self._write(topic, ros.TEXT, now_s, now_s, ros.text_message(text))

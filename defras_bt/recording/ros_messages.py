@@ -37,10 +37,11 @@ def encoded(message_type: str, message: Any) -> bytes:
     return bytes(TYPES.serialize_cdr(message, message_type))
 
 
-def pose_message(stamp_s: float, pose: Pose) -> bytes:
+def pose_message(stamp_s: float, pose: Pose, quaternion_xyzw: Floats) -> bytes:
+    """``quaternion_xyzw`` (4,) is that of the pose; whoever writes many knows most from before."""
     types = TYPES.types
     position = types["geometry_msgs/msg/Point"](*map(float, pose.position_m))
-    orientation = types["geometry_msgs/msg/Quaternion"](*map(float, pose.quaternion_xyzw))
+    orientation = types["geometry_msgs/msg/Quaternion"](*map(float, quaternion_xyzw))
     placed = types["geometry_msgs/msg/Pose"](position=position, orientation=orientation)
     return encoded(POSE, types[POSE](header=_header(stamp_s), pose=placed))
 
