@@ -20,7 +20,7 @@ from defras_bt.executive.proof.report import proof_text
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.executive.tree_spec import TreeSpec
 from defras_sim.resources import resource
-from tests.executive.random_trees import INNER, random_spec
+from tests.executive.random_trees import INNER, random_spec, spec_of
 from tests.executive.unsafe_mutants import DEFRAS_MUTANTS, changed, mutant
 
 OPERATE, LET_GO = "defras/operate", "defras/recover/give_up_grip/let_go"
@@ -113,6 +113,19 @@ def test_the_report_names_the_composite_its_place_and_the_ticks(defras):
         "  tick 1",
         "  tick 2",
     ]
+
+
+def test_what_is_not_known_to_happen_is_not_proved_either(toys):
+    """Push can never be reached, but the proof starts from any state."""
+    never = spec_of(toys.registry, "success_is_failure", [spec_of(toys.registry, "Watch")])
+    root = spec_of(toys.registry, "sequence", [never, spec_of(toys.registry, "Push")], name="n")
+    proof = prove(TreeSpec("n", "", root))
+    (first, *_) = proof.refuted
+    assert (first.claim.name, first.happens, len(first.trace.ticks)) == ("guards_first", False, 1)
+    assert not proof.holds
+    text = proof_text(proof)
+    assert "It is not proved: this tick would break it." in text
+    assert "at fault: n (sequence, tree.yaml:1:1)" in text
 
 
 def test_an_example_that_py_trees_does_not_repeat_is_never_told(defras):
