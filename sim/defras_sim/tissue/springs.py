@@ -183,18 +183,6 @@ class SpringTerm:
         return -(self.springs.rows.T @ self.forces_by_scale_n(positions_m))
 
 
-def joined(parts: list[Springs]) -> Springs:
-    """All springs as one set, in order."""
-    return Springs(
-        sparse.csr_array(sparse.vstack([part.rows for part in parts], format="csr")),
-        np.concatenate([part.stiffness_n_per_m for part in parts]),
-        Dent(
-            np.concatenate([part.dent.give_m_per_n for part in parts]),
-            np.concatenate([part.dent.hardening_n for part in parts]),
-        ),
-    )
-
-
 def _polar(stretch_m: Floats) -> tuple[Floats, Floats]:
     """Direction (r, 3), zero without stretch, and size (r,) of stretches (r, 3)."""
     size_m = np.linalg.norm(stretch_m, axis=1)

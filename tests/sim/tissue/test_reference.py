@@ -13,7 +13,7 @@ from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import slab_mesh
 from defras_sim.tissue.solver import NewtonSettings, NewtonSolver
-from defras_sim.tissue.springs import Springs, SpringTerm, joined
+from defras_sim.tissue.springs import Springs, SpringTerm
 
 E, NU = 3000.0, 0.45
 PRESCRIBED_N_PER_M = 1e7  # far above the stiffest mode of the mesh, 4e3 N/m
@@ -30,18 +30,17 @@ def lift_forces(body: ElasticBody, held: Springs, shifts, lifts_m) -> list[float
     clamped = np.abs(np.abs(x[:, 0]) - 0.06) < 1e-9
     nodes = sparse.eye_array(len(x), format="csr")
     clamp = Springs(nodes[np.flatnonzero(clamped)], np.full(clamped.sum(), PRESCRIBED_N_PER_M))
-    springs = joined([clamp, held])
-    shifts = np.concatenate([np.zeros(clamped.sum()), shifts])
+    clamps = SpringTerm("clamp", clamp, clamp.rows @ x)
     solver = NewtonSolver(NewtonSettings(residual_n=1e-7))
     positions, forces = x, []
     for lift in np.arange(0.0025, max(lifts_m) + 1e-9, 0.0025):
-        targets = springs.rows @ x + shifts[:, None] * [0, 0, lift]
-        energy = PotentialEnergy(len(x), [body, SpringTerm("held", springs, targets)])
+        lifted = SpringTerm("held", held, held.rows @ x + shifts[:, None] * [0, 0, lift])
+        energy = PotentialEnergy(len(x), [body, clamps, lifted])
         solution = solver.minimise(energy, positions)
         assert solution.converged
         positions = solution.positions_m
         if np.isclose(lift, lifts_m).any():
-            forces.append(shifts @ springs.forces(positions, targets)[:, 2])
+            forces.append(shifts @ lifted.forces_n(positions)[:, 2])
     return forces
 
 
