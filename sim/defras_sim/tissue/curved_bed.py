@@ -17,10 +17,10 @@ from defras_sim.anatomy.anatomy import Anatomy
 from defras_sim.anatomy.curved_face import CurvedFace
 from defras_sim.geometry import Floats
 from defras_sim.tissue.bed import CLEARANCE_M, ONSET_M, STIFFNESS_PA_PER_M
+from defras_sim.tissue.boundary import Boundary, boundary_of
 from defras_sim.tissue.layout import Places, add_blocks
 from defras_sim.tissue.mesh import Integers, Mesh
-from defras_sim.tissue.terms import diagonal_pairs, unknown_parameter
-from defras_sim.tissue.tetrahedra import EDGES, FACES
+from defras_sim.tissue.terms import unknown_parameter
 
 # Of the grid on which the height is kept.
 _PITCH_M = 0.004
@@ -55,12 +55,15 @@ class Ground:
 
 @dataclass(frozen=True)
 class CurvedBed:
-    """A boundary term: a unilateral penalty on how deep nodes are below ``ground``, measured along
-    z. ``stiffness_n_per_m`` (nodes,) is each node's share of the pressure; its parameter is how
-    much higher the whole bed stands than the ground, ``height_m``."""
+    """A boundary term: pressure on whatever part of the tissue's surface is below ``ground``.
+
+    As :class:`defras_sim.tissue.bed.Bed`, with the depth measured along z. Its parameter is how
+    much higher than the ground the whole bed stands, ``height_m``.
+    """
 
     ground: Ground
-    stiffness_n_per_m: Floats
+    boundary: Boundary
+    pairs: Integers
     height_m: float = 0.0
     name: str = "bed"
 
@@ -68,68 +71,99 @@ class CurvedBed:
     def parameters(self) -> tuple[str, ...]:
         return ("height_m",)
 
-    @cached_property
-    def pairs(self) -> Integers:
-        return diagonal_pairs(len(self.stiffness_n_per_m))
-
     def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
         """Energy [J] and its gradient (nodes, 3) [N]; zero above the bed."""
-        nodes, depth_m = self._below(positions_m)
-        soft = np.minimum(depth_m, ONSET_M)
-        hard = depth_m - soft
-        stiffness = self.stiffness_n_per_m[nodes]
+        below = self._below(positions_m)
+        soft, hard = _split(below.depth_m)
         energy = soft**3 / (6 * ONSET_M) + hard * (ONSET_M + hard) / 2
-        push = stiffness * (soft**2 / (2 * ONSET_M) + hard)
-        gradient = np.zeros_like(positions_m)
-        gradient[nodes] = push[:, None] * self._uphill(positions_m[nodes])
-        return float(stiffness @ energy), gradient
+        push = below.stiffness_n_per_m * (soft**2 / (2 * ONSET_M) + hard)
+        return float(below.stiffness_n_per_m @ energy), self._spread(below, push, positions_m)
 
     def add_tangent(self, positions_m: Floats, places: Places, entries: Floats) -> None:
-        nodes, depth_m = self._below(positions_m)
-        soft = np.minimum(depth_m, ONSET_M)
-        stiffness = self.stiffness_n_per_m[nodes]
-        push = stiffness * (soft**2 / (2 * ONSET_M) + depth_m - soft)
-        uphill = self._uphill(positions_m[nodes])
-        blocks = np.zeros((len(positions_m), 3, 3))
-        blocks[nodes] = (stiffness * soft / ONSET_M)[:, None, None] * (
-            uphill[:, :, None] * uphill[:, None, :]
-        )
-        blocks[nodes, :2, :2] += push[:, None, None] * self.ground.bend_per_m(
-            positions_m[nodes, :2]
-        )
-        add_blocks(blocks, places, entries)
+        below = self._below(positions_m)
+        if not len(below.face):
+            return
+        soft, hard = _split(below.depth_m)
+        push = below.stiffness_n_per_m * (soft**2 / (2 * ONSET_M) + hard)
+        rate = below.stiffness_n_per_m * soft / ONSET_M
+        blocks = rate[:, None, None] * below.uphill[:, :, None] * below.uphill[:, None, :]
+        bends = self.ground.bend_per_m(below.places_m[:, :2])
+        blocks[:, :2, :2] += push[:, None, None] * bends
+        # Sorted by face: those of one face are added up before they are put in the matrix.
+        faces, first = np.unique(below.face, return_index=True)
+        shares = below.shares[:, :, None, None, None] * below.shares[:, None, :, None, None]
+        by_face = np.add.reduceat(shares * blocks[:, None, None], first, axis=0)
+        width = self.boundary.faces.shape[1]
+        where = places.reshape(len(self.boundary.faces), width * width, 3)[faces].reshape(-1, 3)
+        add_blocks(by_face.reshape(-1, 3, 3), where, entries)
 
     def gradient_by(self, parameter: str, positions_m: Floats) -> Floats:
         if parameter not in self.parameters:
             raise unknown_parameter(self, parameter)
-        nodes, depth_m = self._below(positions_m)
-        rate = self.stiffness_n_per_m[nodes] * np.minimum(depth_m / ONSET_M, 1.0)
-        slope = np.zeros_like(positions_m)
-        slope[nodes] = rate[:, None] * self._uphill(positions_m[nodes])
-        return slope
+        below = self._below(positions_m)
+        rate = below.stiffness_n_per_m * _split(below.depth_m)[0] / ONSET_M
+        return self._spread(below, rate, positions_m)
 
-    def _below(self, positions_m: Floats) -> tuple[Integers, Floats]:
-        """Nodes (k,) below the bed, and how deep (k,)."""
-        low = np.flatnonzero(positions_m[:, 2] < self._highest_m)
-        depth = self.height_m + self.ground.height_m(positions_m[low, :2]) - positions_m[low, 2]
-        return low[depth > 0], depth[depth > 0]
+    def deepest_m(self, positions_m: Floats) -> float:
+        """How far the surface reaches below the bed, at most."""
+        return float(self._below(positions_m).depth_m.max(initial=0.0))
+
+    def _below(self, positions_m: Floats) -> _Below:
+        """The points of the boundary that are below the bed."""
+        edge = self.boundary
+        places = np.einsum("fqa,fad->fqd", edge.values, positions_m[edge.faces])
+        face, point = np.nonzero(places[..., 2] < self._highest_m)
+        places = places[face, point]
+        depth = self.height_m + self.ground.height_m(places[:, :2]) - places[:, 2]
+        deep = depth > 0
+        face, point, places = face[deep], point[deep], places[deep]
+        slope = self.ground.slope(places[:, :2])
+        return _Below(
+            face=face,
+            shares=edge.values[face, point],
+            places_m=places,
+            depth_m=depth[deep],
+            stiffness_n_per_m=STIFFNESS_PA_PER_M * edge.areas_m2[face, point],
+            uphill=np.column_stack([slope, np.full(len(slope), -1.0)]),
+        )
+
+    def _spread(self, below: _Below, push: Floats, positions_m: Floats) -> Floats:
+        """Nodal values (nodes, 3) of ``push`` (k,) on the points, along the depth's gradient."""
+        each = below.shares[:, :, None] * (push[:, None] * below.uphill)[:, None, :]
+        nodal = np.zeros_like(positions_m)
+        np.add.at(nodal, self.boundary.faces[below.face], each)
+        return nodal
 
     @cached_property
     def _highest_m(self) -> float:
         # A cubic spline lies below the largest of its coefficients.
         return self.height_m + float(np.max(self.ground.spline.get_coeffs()))
 
-    def _uphill(self, positions_m: Floats) -> Floats:
-        """Gradient (k, 3) of the depth of nodes by their positions."""
-        slope = self.ground.slope(positions_m[:, :2])
-        return np.column_stack([slope, np.full(len(slope), -1.0)])
+
+@dataclass(frozen=True)
+class _Below:
+    """Points (k,) of the boundary below the bed: their ``face``, ``shares`` (k, w) of its nodes,
+    ``places_m`` (k, 3), ``depth_m`` (k,), its gradient by the place ``uphill`` (k, 3), and the
+    pressure's stiffness (k,)."""
+
+    face: Integers
+    shares: Floats
+    places_m: Floats
+    depth_m: Floats
+    stiffness_n_per_m: Floats
+    uphill: Floats
+
+
+def _split(depth_m: Floats) -> tuple[Floats, Floats]:
+    """The part of a depth over which the stiffness sets in, and the rest."""
+    soft = np.minimum(depth_m, ONSET_M)
+    return soft, depth_m - soft
 
 
 def bed_under_anatomy(mesh: Mesh, anatomy: Anatomy) -> CurvedBed:
-    """The bed on which the tissue rests without touching it. Nodes of its whole surface feel it."""
-    return CurvedBed(
-        ground_under(anatomy.lower, mesh.nodes_m), STIFFNESS_PA_PER_M * surface_shares_m2(mesh)
-    )
+    """The bed on which the tissue rests without touching it."""
+    boundary = boundary_of(mesh)
+    return CurvedBed(ground_under(anatomy.lower, mesh.nodes_m), boundary, boundary.pairs())
 
 
 def ground_under(lower: CurvedFace, nodes_m: Floats) -> Ground:
@@ -147,30 +181,3 @@ def ground_under(lower: CurvedFace, nodes_m: Floats) -> Ground:
     smooth = gaussian_filter(height.reshape(len(x), len(y)), 1.0, mode="nearest")
     touching = Ground(RectBivariateSpline(x, y, smooth)).height_m(nodes_m[:, :2]) - nodes_m[:, 2]
     return Ground(RectBivariateSpline(x, y, smooth - max(0.0, touching.max()) - CLEARANCE_M))
-
-
-def surface_shares_m2(mesh: Mesh) -> Floats:
-    """Area (nodes,) of the surface that each node of ten-node tetrahedra stands for.
-
-    A third of a face's pressure is carried by each of its edges' middles; the corners, which the
-    shape functions give nothing, get a little, so that they do not sink in: 1/12, and 1/4.
-    """
-    corners = mesh.connectivity[:, :4]
-    faces = corners[:, FACES].reshape(-1, 3)
-    middle_of = {pair: 4 + k for k, pair in enumerate(EDGES)}
-    sides = [
-        [middle_of[min(a, b), max(a, b)] for a, b in ((f[0], f[1]), (f[1], f[2]), (f[2], f[0]))]
-        for f in FACES
-    ]
-    middles = mesh.connectivity[:, sides].reshape(-1, 3)
-    _, first, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    outer = first[count == 1]
-    a, b, c = np.moveaxis(mesh.nodes_m[faces[outer]], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    shares = np.zeros(len(mesh.nodes_m))
-    for k in range(3):
-        np.add.at(shares, faces[outer, k], area / 12)
-        np.add.at(shares, middles[outer, k], area / 4)
-    return shares

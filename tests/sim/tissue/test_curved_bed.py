@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from defras_sim.anatomy.anatomy import Anatomy
-from defras_sim.tissue.curved_bed import (
-    CurvedBed,
-    bed_under_anatomy,
-    surface_shares_m2,
-)
+from defras_sim.tissue.bed import STIFFNESS_PA_PER_M
+from defras_sim.tissue.curved_bed import CurvedBed, bed_under_anatomy
 from defras_sim.tissue.layout import TangentLayout
 from defras_sim.tissue.tetrahedral_mesh import TetrahedralMesh, tetrahedral_mesh
 
@@ -66,10 +65,7 @@ def test_the_tangent_is_that_of_the_gradient_and_symmetric(mesh, bed):
 
 def test_the_derivative_by_the_height_is_right(mesh, bed):
     x, step = pressed(mesh), 1e-7
-    up, down = (
-        CurvedBed(bed.ground, bed.stiffness_n_per_m, h).energy_and_gradient(x)[1]
-        for h in (step, -step)
-    )
+    up, down = (replace(bed, height_m=h).energy_and_gradient(x)[1] for h in (step, -step))
     found = bed.gradient_by("height_m", x)
     np.testing.assert_allclose(found, (up - down) / (2 * step), atol=1e-4 * np.abs(found).max())
     with pytest.raises(ValueError, match="height_m"):
@@ -78,16 +74,20 @@ def test_the_derivative_by_the_height_is_right(mesh, bed):
 
 def test_it_only_pushes_and_goes_on_beyond_the_tissue(mesh, bed):
     push = -bed.energy_and_gradient(pressed(mesh))[1]
-    assert np.all(push[:, 2] >= 0)
     assert push[:, 2].sum() > 0.1
+    assert bed.deepest_m(pressed(mesh)) > 0.0008
+    assert bed.deepest_m(mesh.nodes_m) == 0.0
     around = np.random.default_rng(4).uniform(-0.3, 0.3, (200, 2))
     assert np.all(np.isfinite(bed.ground.height_m(around)))
     assert np.all(np.abs(bed.ground.slope(around)) < 1.5)
 
 
-def test_shares_of_the_surface_add_up_to_its_area(flap, mesh):
-    shares = surface_shares_m2(mesh)
-    a, b, c = np.moveaxis(flap.vertices_m[flap.triangles], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-    assert shares.sum() == pytest.approx(area, rel=0.02)
-    assert np.all(shares >= 0)
+def test_it_carries_what_lies_on_it_with_the_pressure_of_the_depth(mesh, bed):
+    """Far below, all of the surface presses: its area is what the resultant grows with."""
+    depth_m = 0.05
+    down = mesh.nodes_m - [0, 0, depth_m]
+    push = -bed.energy_and_gradient(down)[1].sum(axis=0)
+    assert push[2] > 0
+    further = -bed.energy_and_gradient(down - [0, 0, 0.001])[1].sum(axis=0)
+    area_m2 = bed.boundary.areas_m2.sum()
+    assert further[2] - push[2] == pytest.approx(STIFFNESS_PA_PER_M * area_m2 * 0.001, rel=1e-6)
