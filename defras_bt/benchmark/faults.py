@@ -39,6 +39,8 @@ MAX_TIME_S = 25.0
 # A tick that learns takes seconds; only where a node hangs for ever is the limit meant to strike.
 LONGEST_TICK_S = 120.0
 LONGEST_HANG_S = 5.0
+# So often the patient is held in more places than believed: learning takes its time.
+MORE_EVERY = 5
 _KILLED_WITHIN_S = 300.0
 _BROKEN_RECORDERS = {"timeline": (TIMELINE,), "recording": (RECORDING,)}
 
@@ -58,7 +60,7 @@ def campaign(
 ) -> Iterator[FaultRun]:
     """Run every kind with every seed; runs come as they end.
 
-    The plan is made once. With odd seeds the patient is held in more places than believed.
+    The plan is made once. In every fifth run the patient is held in more places than believed.
     """
     prepared = prepare(patient())
     work = (delayed(fault_run)(kind, seed, prepared, tree) for kind in kinds for seed in seeds)
@@ -77,7 +79,7 @@ def fault_run(kind: str, seed: int, prepared: Preparation, tree: str = "defras")
 def _operation(seed: int, prepared: Preparation, tree: str) -> Operation:
     return Operation(
         scene=patient(),
-        actual=patient(MORE) if seed % 2 else patient(),
+        actual=patient(MORE) if seed % MORE_EVERY == 1 else patient(),
         scene_file="fault campaign",
         actual_file=None,
         world="model",

@@ -17,7 +17,7 @@ from defras_bt.cli.files import folder_for
 from defras_bt.faults.faults import KINDS
 
 _NOTES = (
-    "World: model, on a coarse mesh. With odd seeds the patient is held in more places than "
+    "World: model, on a coarse mesh. In every fifth run the patient is held in more places than "
     "believed. Each run has one fault, drawn with its start, duration and other values.",
     "Had to stop: runs in which a fault had to keep the arms still. What counts against a run: "
     "motion that was sent later than one tick after that, too fast, or with an arm that had lost "

@@ -26,10 +26,14 @@ class Interrupts:
     Either way the recordings are finished, and that nothing interrupts: it takes seconds, and what
     it leaves is what the run was recorded for. SIGTERM and SIGHUP count like Ctrl-C; one that was
     ignored when the program started (as under nohup) stays so.
+
+    ``last_deed``: nothing but the program's end comes afterwards, so that whoever goes on pressing
+    Ctrl-C need not be heard any more.
     """
 
-    def __init__(self, desk: OperatorDesk) -> None:
+    def __init__(self, desk: OperatorDesk, *, last_deed: bool = False) -> None:
         self._desk = desk
+        self._last_deed = last_deed
         self._asked = False
         self._ended = False
 
@@ -44,8 +48,9 @@ class Interrupts:
         try:
             yield self
         finally:
+            deaf = self._last_deed and self._asked
             for number, handler in before.items():
-                signal.signal(number, handler)
+                signal.signal(number, signal.SIG_IGN if deaf else handler)
 
     @contextmanager
     def finishing(self) -> Iterator[None]:

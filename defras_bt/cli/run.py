@@ -117,7 +117,7 @@ def run(
         )
     recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console), *recorded]
     desk = OperatorDesk(asks=approve, idle_s=believed.tick_s)
-    interrupts = Interrupts(desk)
+    interrupts = Interrupts(desk, last_deed=True)
     try:
         with at_the_desk(desk, console, out, asks=approve), interrupts.heeded():
             summary = operate(
@@ -132,7 +132,9 @@ def run(
         console.print("Ended by the operator; the arms were stopped first.", style="bold red")
         raise typer.Exit(ExitCode.INTERNAL) from None
     except RecordingFailed as failed:
-        console.print(f"Not everything was recorded: {failed}", style="bold red", markup=False)
+        console.print(
+            f"Not everything was recorded: {failed.message}.", style="bold red", markup=False
+        )
         raise typer.Exit(code_without_record(str(failed.summary.values["outcome"]))) from failed
     if out is not None:
         console.print(

@@ -77,7 +77,9 @@ class CompositeRecorder:
         for recorder in self._recorders:
             self._guarded(recorder, "the end", partial(recorder.finish, summary))
         if self.faults:
-            said = "; ".join(str(fault) for fault in self.faults)
+            # What fails after a recorder's first fault is mostly the same fault again.
+            first = {fault.recorder: fault for fault in reversed(self.faults)}
+            said = "; ".join(str(fault) for fault in reversed(first.values()))
             raise RecordingFailed(said, [fault.error for fault in self.faults], summary)
 
     def _guarded(self, recorder: Recorder, moment: str, call: Callable[[], None]) -> None:

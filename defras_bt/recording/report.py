@@ -26,6 +26,7 @@ from defras_bt.recording.run_log import STATUSES, RunLog
 from defras_bt.recording.scene_picture import endoscope_view, field_view, picture
 from defras_bt.recording.story import newton, outcome_title, percent, result_sentence, times
 from defras_bt.recording.tree_layout import tree_order
+from defras_bt.recording.whole_file import write_whole
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,7 @@ class ReportRecorder:
     def finish(self, summary: RunSummary) -> None:
         if self._log is None:
             return
-        part = self._path.with_name(self._path.name + ".part")
-        part.write_text(report_html(self._log, summary), encoding="utf-8")
-        part.replace(self._path)
+        write_whole(self._path, report_html(self._log, summary))
 
 
 def report_html(log: RunLog, summary: RunSummary) -> str:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from pathlib import Path
 
 from defras_bt.recording.record import Cause, RunInfo, RunSummary, TickRecord
 from defras_bt.recording.run_file import Outcome, RunFile
+from defras_bt.recording.whole_file import write_whole
 
 
 class SummaryRecorder:
@@ -135,16 +135,7 @@ def write_run_json(path: Path, summary: RunSummary) -> None:
     text = json.dumps(
         RunFile.model_validate(dict(summary.values)).model_dump(by_alias=True), indent=2
     )
-    part = path.with_name(path.name + ".part")
-    try:
-        with part.open("w", encoding="utf-8") as stream:
-            stream.write(text + "\n")
-            stream.flush()
-            os.fsync(stream.fileno())
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    write_whole(path, text + "\n")
 
 
 def read_run_json(path: Path) -> RunFile:

@@ -8,6 +8,7 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
+from defras_bt.recording.drain import Drain
 from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
 from defras_bt.recording.story import outcome_sentence, plan_markdown
 from defras_bt.recording.timeline_blueprint import APPLICATION, default_blueprint
@@ -35,12 +36,14 @@ class TimelineRecorder:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._stream: rr.RecordingStream | None = None
+        self._drain: Drain | None = None
         self._info: RunInfo | None = None
         self._lanes: Lanes | None = None
         self._field: Field | None = None
         self._changes = Changes()
 
     def start(self, info: RunInfo) -> None:
+        drain = self._drain = Drain(self._path)
         stream = rr.RecordingStream(
             APPLICATION,
             recording_id=_recording_id(info),
@@ -49,15 +52,16 @@ class TimelineRecorder:
             send_properties=False,
         )
         stream.set_log_time_enabled(False)
-        stream.save(self._path, default_blueprint=_layout(info, pictures=False))
+        stream.save(drain.inlet, default_blueprint=_layout(info, pictures=False))
         self._stream, self._info = stream, info
         _set_time(stream, 0, 0.0)
         log_series(stream)
         self._lanes, self._field = Lanes(stream, info), Field(stream, info)
         stream.flush()
+        drain.check()
 
     def tick(self, record: TickRecord) -> None:
-        if not (self._stream and self._info and self._lanes and self._field):
+        if not (self._stream and self._drain and self._info and self._lanes and self._field):
             raise RuntimeError("a tick came before the start of the run: call start first")
         stream = self._stream
         _set_time(stream, record.tick, record.time_s)
@@ -77,9 +81,10 @@ class TimelineRecorder:
         urgent = any(event.level == "error" for event in record.events)
         if urgent or record.tick % _FLUSH_EVERY == 0:
             stream.flush()
+            self._drain.check()
 
     def finish(self, summary: RunSummary) -> None:
-        if self._stream is None or self._info is None:
+        if self._stream is None or self._drain is None or self._info is None:
             return
         outcome = summary.values.get("outcome")
         if outcome is not None:
@@ -88,6 +93,7 @@ class TimelineRecorder:
         log_limits(self._stream, self._info)
         self._stream.flush()
         self._stream.disconnect()
+        self._drain.close()
 
 
 def _set_time(stream: rr.RecordingStream, tick: int, time_s: float) -> None:
