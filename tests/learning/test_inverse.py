@@ -50,7 +50,8 @@ def test_a_right_belief_is_kept(truth: Scene, record: Record, seed: int) -> None
     found = estimate(truth, record(seed))
     assert not found.adopted
     np.testing.assert_array_equal(found.attached, truth.attached)
-    assert found.held_out_before_m == pytest.approx(0.0005, abs=0.0002)
+    # The camera's noise of 0.5 mm, smoothed, and what the two meshes differ by.
+    assert 0.0001 < found.held_out_before_m < 0.0006
 
 
 def test_a_shifted_camera_is_not_blamed_on_attachments(truth: Scene, record: Record) -> None:

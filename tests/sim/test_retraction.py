@@ -16,7 +16,7 @@ def scene() -> Scene:
     plain = Scene(
         name="right side",
         attachments=Attachments(map=("..........##",) * 12),
-        roi=Roi(center_x_m=0.01, center_y_m=0.01),
+        roi=Roi(center_x_m=0.0, center_y_m=0.01),
     )
     coarse = plain.tissue.model_copy(update={"elements_xyz": (5, 5, 1)})
     return plain.model_copy(update={"tissue": coarse})
