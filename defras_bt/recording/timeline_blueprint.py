@@ -89,7 +89,7 @@ def default_blueprint(*, truth_known: bool, pictures: bool) -> rrb.Blueprint:
                 ],
             ),
         ),
-        row_shares=[2.1, 3.6, 1.9, 1.9, 1.6, 2.0],
+        row_shares=[2.9, 3.2, 1.8, 1.8, 1.5, 1.9],
     )
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[5, 4]),

@@ -83,5 +83,10 @@ def test_a_remedy_that_does_not_exist_is_refused():
             LOST = "lost", "the probe is lost", "prayer"
 
 
+def test_the_documentation_lists_every_code_as_it_is():
+    documented = (PACKAGE.parent / "docs" / "reasons.md").read_text(encoding="utf-8")
+    assert documented.endswith(codes_table())
+
+
 def test_the_examples_are_true():
     assert doctest.testmod(reasons).failed == 0
