@@ -99,7 +99,7 @@ def _wired(wire: Any, path: str) -> str:
 
 
 def _text(value: Any, where: str) -> str:
-    """A value as BehaviorTree.CPP reads it; lists are separated by semicolons."""
+    """A value as BehaviorTree.CPP reads it. A semicolon separates, and marks a list of one."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, (int, float)):
@@ -107,8 +107,8 @@ def _text(value: Any, where: str) -> str:
     if isinstance(value, list) and not any(isinstance(item, (dict, list)) for item in value):
         parts = [_text(item, where) for item in value]
         if not any(";" in part for part in parts):
-            return ";".join(parts)
-    elif isinstance(value, str) and not value.startswith("{"):
+            return f"{parts[0]};" if len(parts) == 1 else ";".join(parts)
+    elif isinstance(value, str) and not value.startswith("{") and ";" not in value:
         return value
     raise CannotExport(f"{where}: {value!r} has no counterpart in an attribute of XML")
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, get_origin
+from typing import Any
 from xml.parsers import expat
-
-from pydantic import BaseModel
 
 from defras_bt.executive.ports import ports_of
 from defras_bt.executive.registry import NODES, Registry
@@ -189,13 +187,8 @@ class _Importer:
             elif _pointer(text) is not None:
                 self._fault(element, f"{name}={text!r}: this is a parameter here, not a port")
             else:
-                body[name] = _listed(text, self._options(kind), name)
+                body[name] = _listed(text)
         return body | ({"ports": wires} if wires else {})
-
-    def _options(self, kind: str) -> type[BaseModel] | None:
-        if kind in KINDS:
-            return KINDS[kind].options
-        return self._leaves[kind].Parameters if kind in self._leaves else None
 
     def _subtree(
         self, element: XmlElement, at: Location, inside: tuple[str, ...], is_root: bool
@@ -240,9 +233,6 @@ def _typed(value: Any, kind: type) -> Any:
     return value
 
 
-def _listed(text: str, options: type[BaseModel] | None, name: str) -> Any:
-    """Text, or a list where the option is one."""
-    known = options.model_fields.get(name) if options is not None else None
-    if known is not None and get_origin(known.annotation) in (tuple, list):
-        return text.split(";")
-    return text
+def _listed(text: str) -> Any:
+    """Text, or the list that its semicolons make of it."""
+    return text.removesuffix(";").split(";") if ";" in text else text

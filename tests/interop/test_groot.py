@@ -63,6 +63,23 @@ class TestRoundTrip:
         tree = read_tree(resource(f"trees/{name}.yaml"), must_be_guarded=False)
         assert dump_tree(through_xml(tree, tmp_path)) == dump_tree(tree)
 
+    @pytest.mark.parametrize("kind", sorted(DECORATORS))
+    def test_every_decorator(self, kind, tmp_path, write_tree):
+        options = {
+            name: {"ticks": 3, "until": "completion", "status": "failure"}.get(name, 2)
+            for name in DECORATORS[kind].options.model_fields
+        }
+        said = "".join(f"{name}: {value}, " for name, value in options.items())
+        tree = read_tree(write_tree(f"name: t\ntree: {{{kind}: {{{said}child: SensorsFresh}}}}"))
+        assert dump_tree(through_xml(tree, tmp_path)) == dump_tree(tree)
+
+    @pytest.mark.parametrize("succeed_when", ["all", "one", "[first]", "[first, second]"])
+    def test_every_parallel(self, succeed_when, tmp_path, write_tree):
+        children = "[{SensorsFresh: {name: first}}, {SensorsFresh: {name: second}}]"
+        text = f"{{parallel: {{succeed_when: {succeed_when}, children: {children}}}}}"
+        tree = read_tree(write_tree(f"name: t\ntree: {text}"))
+        assert dump_tree(through_xml(tree, tmp_path)) == dump_tree(tree)
+
     def test_every_kind_of_value(self, tmp_path, write_tree):
         tree = read_tree(write_tree(EVERY_KIND))
         again = through_xml(tree, tmp_path)
