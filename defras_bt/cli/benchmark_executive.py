@@ -43,11 +43,12 @@ def executive(
         f"Load of the machine ({os.cpu_count()} processors): {load}.",
     ]
     write_benchmark(out, "executive", "The executive's own time", {"Per tick": rows}, notes)
-    table = Table(*rows[0])
+    table = Table(*rows[0], box=None)
     for row in rows:
         table.add_row(*map(str, row.values()))
     console = Console()
-    console.print(table)
+    # Where nobody set a width, a row of numbers should not be broken.
+    console.print(table, width=None if console.is_terminal else 120)
     for note in notes:
         console.print(note)
     typer.echo(f"Written to {out}: executive.json, executive.csv, executive.html")
