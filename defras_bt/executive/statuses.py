@@ -138,7 +138,7 @@ class TickedVisitor(py_trees.visitors.VisitorBase):
 
     def _word(self, behaviour: Behaviour) -> _Word:
         status = behaviour.status
-        decider = deciding_child(behaviour, self._now)
+        decider = deciding_child(behaviour, self._now) if behaviour.children else None
         if decider is not None:
             heard = self._now[decider]
             return _Word(status, heard.code, heard.message, decider, heard.leaf)
@@ -160,8 +160,6 @@ def deciding_child(parent: Behaviour, heard: Mapping[Behaviour, _Word]) -> Behav
     selector failed, one that was not even tried decides nothing. Call it as soon as ``parent`` was
     ticked; ``heard`` has what was ticked in this tick.
     """
-    if not parent.children:
-        return None
     ticked = [child for child in parent.children if child in heard]
     if not ticked or isinstance(parent, py_trees.decorators.Decorator):
         return ticked[-1] if ticked else None
