@@ -12,7 +12,6 @@ from defras_bt.cli.files import find
 from defras_bt.executive.registry import registered_nodes
 from defras_bt.executive.tree_dump import dump_tree
 from defras_bt.executive.tree_file import read_tree
-from defras_bt.interop.btlog import btlog_of_run
 from defras_bt.interop.groot_export import CannotExport, groot_xml
 from defras_bt.interop.groot_import import import_groot as read_groot
 from defras_bt.recording.decision_reader import InvalidDecisions
@@ -38,6 +37,9 @@ def export_groot(
             target = out or Path(tree) / "run.btlog"
             if target.suffix != ".btlog":
                 raise UserError(f"--out {target}: Groot2 opens logs that end in .btlog")
+            # Reading a run takes all that can be recorded of one, and a second to load.
+            from defras_bt.interop.btlog import btlog_of_run
+
             target.write_bytes(btlog_of_run(Path(tree), registered_nodes()))
         else:
             xml = groot_xml(read_tree(find(tree, "trees")), registered_nodes())
