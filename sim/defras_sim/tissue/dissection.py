@@ -17,7 +17,7 @@ from defras_sim.tissue.matrices import jit
 from defras_sim.tissue.mesh import Integers
 
 # Nodes of a set that is not cut any more. Larger sets waste arithmetic, smaller ones calls.
-LEAF_NODES = 16
+LEAF_NODES = 24
 # Shares of the nodes below the planes that are tried.
 _SHARES: Floats = np.linspace(0.32, 0.68, 13)
 
