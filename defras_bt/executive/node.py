@@ -71,6 +71,7 @@ class Node(py_trees.behaviour.Behaviour):
         {Status.SUCCESS, Status.FAILURE, Status.RUNNING}
     )
     opens_jaws: ClassVar[bool] = False
+    status: Status
 
     @classmethod
     def promise(cls, parameters: Any, variable: str, value: str) -> Status | None:
