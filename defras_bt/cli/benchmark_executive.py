@@ -46,9 +46,9 @@ def executive(
     table = Table(*rows[0], box=None)
     for row in rows:
         table.add_row(*map(str, row.values()))
-    console = Console()
-    # Where nobody set a width, a row of numbers should not be broken.
-    console.print(table, width=None if console.is_terminal else 120)
+    # In a file, a row of numbers should not be broken.
+    console = Console() if Console().is_terminal else Console(width=120)
+    console.print(table)
     for note in notes:
         console.print(note)
     typer.echo(f"Written to {out}: executive.json, executive.csv, executive.html")
