@@ -48,7 +48,7 @@ class NewtonSettings:
     max_step_m: float = 0.01
     sufficient_decrease: float = 1e-4
     min_step_share: float = 1 / 512
-    patience: float = 8.0
+    patience: float = 16.0
 
 
 @dataclass(frozen=True)
