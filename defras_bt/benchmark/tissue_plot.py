@@ -79,15 +79,8 @@ def _error_against_time(axes: Axes, cases: Sequence[Case]) -> None:
     axes.set(xscale="log", yscale="log")
     axes.axhline(5, color=_GREY, lw=0.8, ls="--")
     axes.axvline(1, color=_GREY, lw=0.8, ls="--")
-    axes.annotate("5 %", (0.0, 5), xycoords=("axes fraction", "data"), color=_GREY, va="bottom")
-    axes.annotate(
-        "real time",
-        (1, 1.0),
-        xycoords=("data", "axes fraction"),
-        color=_GREY,
-        rotation=90,
-        va="top",
-    )
+    _note(axes, "5 %", (0.0, 5), ("axes fraction", "data"))
+    _note(axes, "real time", (1, 0.0), ("data", "axes fraction"))
     axes.set(
         xlabel="computing per simulated second [s]",
         ylabel="median error of the force [%]",
@@ -106,12 +99,15 @@ def _growth(axes: Axes, sizes: Sequence[Growth]) -> None:
                 text = "x".join(map(str, size.cells_xyz))
                 axes.annotate(text, (across, up), (3, -9), textcoords="offset points", fontsize=7)
     axes.axhline(_FRAME_MS, color=_GREY, lw=0.8, ls="--")
-    axes.annotate(
-        "a frame", (0.0, _FRAME_MS), xycoords=("axes fraction", "data"), color=_GREY, va="bottom"
-    )
+    _note(axes, "a frame", (0.0, _FRAME_MS), ("axes fraction", "data"))
     axes.set(xscale="log", yscale="log", xlabel="unknowns", ylabel="computing for 1 mm [ms]")
     axes.set_title("Growth with the mesh")
     _legend(axes)
+
+
+def _note(axes: Axes, text: str, at: tuple[float, float], system: tuple[str, str]) -> None:
+    """A word beside a line."""
+    axes.annotate(text, at, (4, 3), xycoords=system, textcoords="offset points", color=_GREY)
 
 
 def _legend(axes: Axes) -> None:
