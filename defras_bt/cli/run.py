@@ -16,8 +16,10 @@ from defras_bt.cli.plan import rehearsed, tell
 from defras_bt.executive.deadline import interrupting
 from defras_bt.executive.operation import WORLDS, Operation, operate
 from defras_bt.executive.operator_desk import OperatorDesk
+from defras_bt.executive.proof.prover import prove
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, read_substitutes
 from defras_bt.executive.tree_file import read_tree
+from defras_bt.executive.tree_spec import TreeSpec
 from defras_bt.faults.faults import NO_FAULTS, FaultInjection
 from defras_bt.faults.file import read_faults
 from defras_bt.planning.preparation import needs_plan
@@ -63,7 +65,8 @@ def run(
 
     Leaves run.rrd, recording.mcap, decisions.jsonl, run.json and report.html in --out. Exit code:
     0 goal reached, 2 invalid input, 3 goal not reached, 4 a human was asked, 1 internal error, or
-    goal reached but not everything could be recorded. Ctrl-C stops the arms and asks a human.
+    goal reached but not everything could be recorded. Ctrl-C stops the arms and asks a human. A
+    tree that is not proved safe (see defras tree prove) is not run.
 
     While it runs, keys and "defras operator" pause, resume, stop, take over and hand back.
 
@@ -76,6 +79,7 @@ def run(
     _require_same_set_up(believed, truth)
     tree_file = find(tree, "trees")
     tree_spec = read_tree(tree_file)
+    _require_safe(tree_spec, tree)
     substitutes = NOTHING_SUBSTITUTED if substitute is None else read_substitutes(substitute)
     substituted = substitutes.paths(tree_spec)
     injected = NO_FAULTS
@@ -167,6 +171,17 @@ def file_recorders(out: Path) -> list[Recorder]:
         SummaryRecorder(out / "run.json"),
         ReportRecorder(out / "report.html"),
     ]
+
+
+def _require_safe(tree: TreeSpec, named: str) -> None:
+    """A tree whose guards do not stop every motion in time is not run, in no world."""
+    proof = prove(tree)
+    if not proof.holds:
+        claims = "; ".join(refutation.claim.statement for refutation in proof.refuted)
+        raise UserError(
+            f"--tree {named}: not run, because it is not proved that {claims}. "
+            f"`defras tree prove {named}` shows the ticks that break it and the node at fault"
+        )
 
 
 def _require_same_set_up(believed: Scene, truth: Scene) -> None:
