@@ -24,7 +24,7 @@ reactive:
     - Watch: {name: force}
     - invert: {name: unless, child: {Watch: {name: stopped}}}
     - selector:
-        name: work
+        name: doing
         children:
           - reactive: {name: careful, children: [{Watch: {name: near}}, {plan_slot: {name: act}}]}
           - Mend
@@ -62,9 +62,9 @@ class TestTrees:
         told = substitutes(
             "  - {path: '*/force', status: FAILURE}\n"
             "  - {path: '**/stopped', status: RUNNING}\n"
-            "  - {path: toy/work/mend, status: SUCCESS}\n"
+            "  - {path: toy/doing/mend, status: SUCCESS}\n"
         )
-        assert told.paths(spec) == ("toy/force", "toy/unless/stopped", "toy/work/mend")
+        assert told.paths(spec) == ("toy/force", "toy/unless/stopped", "toy/doing/mend")
         tree = load_toys(TREE)
         slot = tree.plan_slot
         tree = told.into_tree(tree, toy_context)
@@ -72,7 +72,7 @@ class TestTrees:
         assert [path for path, kind in kinds.items() if kind == "ScriptedLeaf"] == [
             "toy/force",
             "toy/unless/stopped",
-            "toy/work/mend",
+            "toy/doing/mend",
         ]
         assert list(kinds) == [path for path, _ in spec.root.walk()], "names and order stay"
         assert tree.plan_slot is slot
@@ -185,23 +185,23 @@ class TestFaults:
             "2:6: no node has the path 'toy/unless/stoped'; did you mean toy/unless/stopped"
         )
 
-    @pytest.mark.parametrize("path", ["toy", "toy/work", "toy/*/careful", "**/act", "**"])
+    @pytest.mark.parametrize("path", ["toy", "toy/doing", "toy/*/careful", "**/act", "**"])
     def test_the_place_for_plans_has_to_stay(self, substitutes, spec, path):
         told = substitutes(f"  - {{path: '{path}', status: SUCCESS}}\n")
         (fault,) = faults(lambda: told.paths(spec))
         assert "where plans are carried out" in fault
-        assert "'toy/work/careful/act/*_pull_*'" in fault
+        assert "'toy/doing/careful/act/*_pull_*'" in fault
 
     def test_an_entry_that_replaces_nothing_more(self, substitutes, spec):
         told = substitutes(
             "  - {path: '**/mend', status: SUCCESS}\n"
             "  - {path: toy/unless, status: SUCCESS}\n"
             "  - {path: toy/unless/stopped, status: SUCCESS}\n"
-            "  - {path: 'toy/work/m*', status: SUCCESS}\n"
+            "  - {path: 'toy/doing/m*', status: SUCCESS}\n"
         )
         assert faults(lambda: told.paths(spec)) == [
             "4:6: 'toy/unless/stopped' replaces nothing that line 3 does not",
-            "5:6: 'toy/work/m*' replaces nothing that line 2 does not",
+            "5:6: 'toy/doing/m*' replaces nothing that line 2 does not",
         ]
 
     def test_an_empty_file(self, substitutes):
