@@ -7,17 +7,16 @@ felupe comes with the extra ``[test]``.
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, Literal
 
 import felupe
 import numpy as np
-from felupe.mechanics._helpers import Assemble, Results
 from scipy import sparse
 
 from defras_sim.geometry import Floats
 from defras_sim.scene import RIGID_HOLE_N_PER_M, MaterialName, Scene
-from defras_sim.tissue.discs import _MOMENTS as DISC_MOMENTS
-from defras_sim.tissue.discs import _POINTS as DISC_POINTS
+from defras_sim.tissue.discs import DISC_MOMENTS, DISC_POINTS
 from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import Integers
 
@@ -141,8 +140,8 @@ class HeldDiscs:
         self._stiffness = RIGID_HOLE_N_PER_M * sparse.csr_matrix(
             sparse.kron(rows.T @ rows, sparse.eye_array(3))
         )
-        self.results = Results()
-        self.assemble = Assemble(vector=self._vector, matrix=self._matrix)
+        self.results = SimpleNamespace(update_statevars=lambda: None)  # springs have no memory
+        self.assemble = SimpleNamespace(vector=self._vector, matrix=self._matrix, multiplier=None)
 
     def forces_n(self) -> Floats:
         """Force (rows, 3) on each held quantity."""

@@ -12,7 +12,7 @@ from typing import Any
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem}
 table{border-collapse:collapse;width:100%;margin:1rem 0}th,td{padding:.3rem .6rem;text-align:right}
 th{border-bottom:2px solid #345;vertical-align:bottom}td{border-bottom:1px solid #dde}
-th:first-child,td:first-child{text-align:left}td:nth-child(-n+3){white-space:nowrap}.good{color:#186a3b}.bad{color:#922b21}svg{max-width:100%;height:auto}"""
+th:first-child,td:first-child{text-align:left}td:nth-child(-n+2){white-space:nowrap}.good{color:#186a3b}.bad{color:#922b21}svg{max-width:100%;height:auto}"""
 
 Table = Sequence[Mapping[str, Any]]
 

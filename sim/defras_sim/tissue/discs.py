@@ -31,13 +31,13 @@ def _unit_disc() -> tuple[Floats, Floats]:
     return points, np.repeat(w / 2 / _SPOKES, _SPOKES)
 
 
-_POINTS, _WEIGHTS = _unit_disc()
+DISC_POINTS, _WEIGHTS = _unit_disc()
 
 # Rows of a disc: mean, and first moments along x and y, orthonormal over the disc, so that each
 # takes the patch's stiffness in N/m.
 ROWS = 3
-_MOMENTS: Floats = (
-    np.stack([np.ones(len(_WEIGHTS)), 2 * _POINTS[:, 0], 2 * _POINTS[:, 1]]) * _WEIGHTS
+DISC_MOMENTS: Floats = (
+    np.stack([np.ones(len(_WEIGHTS)), 2 * DISC_POINTS[:, 0], 2 * DISC_POINTS[:, 1]]) * _WEIGHTS
 )
 # Only the mean moves with a translation.
 ROW_SHIFTS: Floats = np.array([1.0, 0.0, 0.0])
@@ -50,9 +50,9 @@ def disc_rows(mesh: Mesh, centers_xy_m: Floats, radius_m: float, face: Face) -> 
     over the rim is squeezed into the face.
     """
     centers = np.asarray(centers_xy_m, dtype=float)
-    spread = _POINTS @ face.tangents(centers)[..., :2]  # (discs, points, 2)
+    spread = DISC_POINTS @ face.tangents(centers)[..., :2]  # (discs, points, 2)
     points = face.at(centers[:, None, :] + radius_m * spread).reshape(-1, 3)
-    moments = sparse.kron(sparse.eye_array(len(centers)), _MOMENTS, format="csr")
+    moments = sparse.kron(sparse.eye_array(len(centers)), DISC_MOMENTS, format="csr")
     return sparse.csr_array(moments @ mesh.interpolation(points))
 
 
