@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defras_sim.geometry import Floats
+from defras_sim.tissue import blocks
 from defras_sim.tissue.matrices import cofactor, jacobi_eigen, jit
 from defras_sim.tissue.mesh import Integers
 
@@ -68,28 +69,8 @@ def add_stiffness(
     for e in range(elements):
         block[:] = 0.0
         for q in range(points):
-            slopes, A, volume = gradients[e, q], tangents[e, q], volumes[e, q]
-            for i in range(3):
-                for k in range(i, 3):
-                    target = block[i, k]
-                    for a in range(width):
-                        x = y = z = 0.0
-                        for j in range(3):
-                            g = volume * slopes[j, a]
-                            x += g * A[3 * i + j, 3 * k]
-                            y += g * A[3 * i + j, 3 * k + 1]
-                            z += g * A[3 * i + j, 3 * k + 2]
-                        for b in range(width):
-                            target[a, b] += x * slopes[0, b] + y * slopes[1, b] + z * slopes[2, b]
-        for b in range(width):
-            for a in range(width):
-                for k in range(3):
-                    place = places[e, a, b, k]
-                    for i in range(3):
-                        if i <= k:
-                            entries[place + i] += block[i, k, a, b]
-                        else:
-                            entries[place + i] += block[k, i, b, a]
+            blocks.add_point(block, gradients[e, q], tangents[e, q], volumes[e, q])
+        blocks.add_to_matrix(block, places[e], entries)
 
 
 @jit

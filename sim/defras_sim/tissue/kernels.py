@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defras_sim.geometry import Floats
-from defras_sim.tissue import materials
+from defras_sim.tissue import blocks, materials
 from defras_sim.tissue.matrices import jit
 from defras_sim.tissue.mesh import Integers
 
@@ -95,28 +95,8 @@ def tangent(
             slopes = gradients[e, q]
             _deformation(slopes, local, F)
             materials.tangent(code, F, mu[e, q], lam[e, q], A)
-            volume = volumes[e, q]
-            for i in range(3):
-                for k in range(i, 3):
-                    target = block[i, k]
-                    for a in range(width):
-                        x = y = z = 0.0
-                        for j in range(3):
-                            g = volume * slopes[j, a]
-                            x += g * A[3 * i + j, 3 * k]
-                            y += g * A[3 * i + j, 3 * k + 1]
-                            z += g * A[3 * i + j, 3 * k + 2]
-                        for b in range(width):
-                            target[a, b] += x * slopes[0, b] + y * slopes[1, b] + z * slopes[2, b]
-        for b in range(width):
-            for a in range(width):
-                for k in range(3):
-                    place = places[e, a, b, k]
-                    for i in range(3):
-                        if i <= k:
-                            out[place + i] += block[i, k, a, b]
-                        else:
-                            out[place + i] += block[k, i, b, a]
+            blocks.add_point(block, slopes, A, volumes[e, q])
+        blocks.add_to_matrix(block, places[e], out)
 
 
 @jit
