@@ -29,6 +29,8 @@ from defras_sim.worlds.protocol import HOLD, Command, World
 
 # So long a tree may want motion that the gate refuses before a human is asked.
 REFUSED_PATIENCE_S = 5.0
+# So many ticks the world's clock may stand still: no patience in world time would ever end then.
+CLOCK_PATIENCE_TICKS = 60
 
 
 class ExecutiveFailed(RuntimeError):
@@ -79,6 +81,7 @@ class Executive:
         self._over_before = False
         self._stopped_before: tuple[str, ...] = ()
         self._refused_since_s: float | None = None
+        self._clock_s, self._clock_ticks = float("-inf"), 0
         self.last: TickRecord | None = None
         """The record of the latest tick."""
 
@@ -136,6 +139,7 @@ class Executive:
             board.tell("end", f"Stopped after {inputs.time_s:.0f} s without the goal.", "error")
             why = f"time is over after {inputs.time_s:.0f} s"
             board.end("not_reached", why, Code.TIME_OVER)
+        self._end_if_clock_stands(inputs.time_s)
         proposal = Proposal(board.command, board.rate, self._actions.acting, self._world.time_s)
         verdict = self._gate.check(proposal, inputs)
         self._tell_stopped(verdict)
@@ -213,6 +217,16 @@ class Executive:
             self._board.tell("hold", sentence, "warning")
         self._stopped_before = stopped
         self._end_if_refused_for_long(stopped)
+
+    def _end_if_clock_stands(self, time_s: float) -> None:
+        """Where time does not pass, nothing that waits for it would ever end the run."""
+        self._clock_ticks = self._clock_ticks + 1 if time_s <= self._clock_s else 0
+        self._clock_s = time_s
+        if self._clock_ticks >= CLOCK_PATIENCE_TICKS and self._board.outcome is None:
+            why = f"the world's clock stood still for {CLOCK_PATIENCE_TICKS} ticks"
+            sentence = f"Motion stopped, a human is asked to take over: {why}."
+            self._board.tell("human", sentence, "error")
+            self._board.end("human", why, Code.STALE)
 
     def _end_if_refused_for_long(self, stopped: tuple[str, ...]) -> None:
         """A tree that goes on wanting what the gate refuses does not know what to do."""

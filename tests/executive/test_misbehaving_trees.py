@@ -236,3 +236,15 @@ class TestLateTrees:
     def test_a_limit_has_to_be_positive(self):
         with pytest.raises(ValueError, match="positive"):
             interrupting(0.0)
+
+
+def test_a_world_whose_clock_stands_still_does_not_run_for_ever():
+    stage = at_pull()
+    stage.bench.world.step = lambda: None
+    for _ in range(70):
+        if stage.board.outcome is not None:
+            break
+        stage.tick()
+    assert stage.board.outcome == "human"
+    assert "clock stood still" in stage.board.outcome_reason
+    assert all(still(record) for record in stage.notes.records[-60:])
