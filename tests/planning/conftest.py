@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from defras_sim.scene import Scene
@@ -30,3 +31,13 @@ def scene() -> Scene:
 def crowded() -> Scene:
     """Twelve points 15 mm apart in x and 10 mm in y: the arms can be in each other's way."""
     return make_scene(columns=3, rows=4, margin_m=0.045)
+
+
+def same_outcomes(one, other) -> bool:
+    """Whether executions are the same but for rounding, which the number of threads changes."""
+    return len(one) == len(other) and all(
+        (a.point, a.manoeuvres, a.finished) == (b.point, b.manoeuvres, b.finished)
+        and np.isclose(a.visibility, b.visibility, rtol=0, atol=1e-2)
+        and np.isclose(a.force_max_n, b.force_max_n, rtol=1e-6)
+        for a, b in zip(one, other, strict=True)
+    )
