@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from defras_bt.monitoring.closest import closest_on_triangles
 from defras_bt.monitoring.metric import Measurement
+from defras_bt.monitoring.neighbours import neighbourhood_medians
 from defras_bt.monitoring.seen import SeenSurface
 from defras_sim.geometry import Floats
 
@@ -44,12 +44,10 @@ class LocalMetric:
 
     def smoothed_m(self, cloud_m: Floats, distance_m: Floats) -> Floats:
         """Median of ``distance_m`` (n,) over each point's neighbourhood, NaN where too few."""
-        neighbours = min(self.max_neighbours, len(cloud_m))
-        _, index = cKDTree(cloud_m).query(
-            cloud_m, neighbours, distance_upper_bound=self.diameter_m / 2
+        return neighbourhood_medians(
+            np.ascontiguousarray(cloud_m),
+            distance_m,
+            self.diameter_m / 2,
+            self.min_neighbours,
+            self.max_neighbours,
         )
-        values = np.sort(np.append(distance_m, np.inf)[index], axis=1)
-        count = np.sum(index < len(cloud_m), axis=1)
-        each = np.arange(len(cloud_m))
-        median = (values[each, (count - 1) // 2] + values[each, count // 2]) / 2
-        return np.where(count >= self.min_neighbours, median, np.nan)

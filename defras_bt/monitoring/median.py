@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from defras_bt.monitoring.metric import Measurement
+from defras_bt.monitoring.neighbours import nearest_m
 from defras_bt.monitoring.seen import SeenSurface
 from defras_sim.geometry import Floats
 
@@ -25,5 +25,5 @@ class MedianMetric:
     def measure(self, cloud_m: Floats, seen: SeenSurface) -> Measurement:
         if len(cloud_m) == 0 or len(seen.samples_m) == 0:
             return Measurement(float("nan"), np.full(len(cloud_m), np.nan))
-        distance, _ = cKDTree(seen.samples_m).query(cloud_m)
-        return Measurement(float(np.median(distance)), np.asarray(distance))
+        distance = nearest_m(np.ascontiguousarray(cloud_m), seen.samples_m)
+        return Measurement(float(np.median(distance)), distance)

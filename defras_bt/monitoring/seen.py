@@ -8,15 +8,17 @@ the twin has a flap in front of it would match tissue that the twin itself hides
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defras_sim.camera.pinhole import in_picture
-from defras_sim.camera.ray_caster import RayCaster
-from defras_sim.geometry import Floats
+from defras_bt.monitoring.hidden import facing_triangles, seen_places
+from defras_sim.camera.pinhole import intrinsics, tissue_from_camera
+from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import Camera
 from defras_sim.surface import Surface
+from defras_sim.tissue.matrices import jit
 
 # Barycentric places at which a triangle is tested: near its corners and in the middle. They are
 # also the simulated cloud, about 3 mm apart on a mesh of the default density.
@@ -39,14 +41,50 @@ class SeenSurface:
 
 def seen_surface(surface: Surface, camera: Camera) -> SeenSurface:
     """What ``camera`` sees of ``surface``; everything is empty where it sees nothing."""
-    corners = surface.vertices_m[surface.triangles]
-    eye = np.array(camera.position_m)
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = np.flatnonzero(np.einsum("ij,ij->i", normal, eye - corners.mean(axis=1)) > 0.0)
-    samples = np.einsum("sk,tkd->tsd", _PLACES, corners[facing]).reshape(-1, 3)
-    seen = RayCaster(surface).sees(eye, samples) & in_picture(camera, samples)
-    seen_triangle = seen.reshape(-1, len(_PLACES)).any(axis=1)
-    touched = np.zeros(len(surface.vertices_m), bool)
-    touched[surface.triangles[facing[seen_triangle]]] = True
-    chosen = facing[touched[surface.triangles[facing]].any(axis=1)]
-    return SeenSurface(chosen, corners[chosen], samples[seen])
+    pose, intrinsic, size_px = _optics(camera)
+    vertices = np.ascontiguousarray(surface.vertices_m)
+    triangles = np.ascontiguousarray(surface.triangles)
+    in_camera = (vertices - pose.position_m) @ pose.rotation
+    facing = facing_triangles(in_camera, triangles)
+    seen = seen_places(in_camera, triangles[facing], _PLACES, intrinsic, size_px)
+    return SeenSurface(*_gathered(vertices, triangles, facing, seen, _PLACES))
+
+
+@lru_cache(maxsize=8)
+def _optics(camera: Camera) -> tuple[Pose, Floats, Floats]:
+    """tissue_from_camera, intrinsics (3, 3) and size in pixels (2,)."""
+    size_px = np.array([camera.width_px, camera.height_px], float)
+    return tissue_from_camera(camera), intrinsics(camera), size_px
+
+
+@jit
+def _gathered(
+    vertices_m: Floats,
+    triangles: NDArray[np.int64],
+    facing: NDArray[np.int64],
+    seen: NDArray[np.bool_],
+    places: Floats,
+) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """What :class:`SeenSurface` holds, of triangles ``facing`` (m,) with ``seen`` (m, s) places."""
+    touched, samples, count = np.zeros(len(vertices_m), np.bool_), np.empty((seen.size, 3)), 0
+    for i in range(len(facing)):
+        a, b, c = triangles[facing[i], 0], triangles[facing[i], 1], triangles[facing[i], 2]
+        for s in range(len(places)):
+            if seen[i, s]:
+                touched[a] = touched[b] = touched[c] = True
+                for k in range(3):
+                    samples[count, k] = (
+                        places[s, 0] * vertices_m[a, k]
+                        + places[s, 1] * vertices_m[b, k]
+                        + places[s, 2] * vertices_m[c, k]
+                    )
+                count += 1
+    chosen, corners, found = np.empty_like(facing), np.empty((len(facing), 3, 3)), 0
+    for t in facing:
+        if touched[triangles[t, 0]] or touched[triangles[t, 1]] or touched[triangles[t, 2]]:
+            chosen[found] = t
+            for k in range(3):
+                for j in range(3):
+                    corners[found, k, j] = vertices_m[triangles[t, k], j]
+            found += 1
+    return chosen[:found].copy(), corners[:found].copy(), samples[:count].copy()

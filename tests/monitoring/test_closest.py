@@ -60,3 +60,28 @@ def test_bad_input_is_refused() -> None:
         closest_on_triangles(np.zeros((1, 3)), np.zeros((0, 3, 3)))
     with pytest.raises(ValueError, match="finite"):
         closest_on_triangles(np.full((1, 3), np.nan), np.zeros((1, 3, 3)))
+
+
+@pytest.mark.parametrize("off_m", [0.0, 0.01, 0.5])
+@pytest.mark.parametrize("size_m", [0.002, 0.02])
+def test_nothing_nearer_is_missed_among_random_triangles(off_m: float, size_m: float) -> None:
+    rng = np.random.default_rng(7)
+    middle = rng.uniform(-0.06, 0.06, (250, 1, 3)) * [1, 1, 0.2]
+    corners = middle + size_m * rng.normal(size=(250, 3, 3))
+    corners[::50] *= 5.0
+    points = rng.uniform(-0.06, 0.06, (150, 3)) + off_m * rng.normal(size=(150, 3))
+    found = closest_on_triangles(points, corners)
+    mesh = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(750).reshape(-1, 3), process=False)
+    _, expected, _ = trimesh.proximity.closest_point_naive(mesh, points)
+    np.testing.assert_allclose(found.distance_m, expected, atol=1e-12)
+
+
+def test_of_triangles_equally_near_the_first_counts() -> None:
+    fan = np.array(
+        [
+            [[0.0, 0, 0], [np.cos(a), np.sin(a), 0], [np.cos(b), np.sin(b), 0]]
+            for a, b in zip(np.arange(6.0), np.arange(1.0, 7.0), strict=True)
+        ]
+    )
+    points = np.array([[5.0, 5.0, 0.0], [0.0, 0.0, 1.0], [-3.0, 0.0, 0.0], [0.0, 0.0, 2.0]])
+    assert closest_on_triangles(points, fan).triangle[[1, 3]].tolist() == [0, 0]

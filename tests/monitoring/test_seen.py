@@ -5,11 +5,77 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
+from numpy.typing import NDArray
 
-from defras_bt.monitoring.seen import seen_surface
+from defras_bt.monitoring.seen import SeenSurface, seen_surface
+from defras_sim.camera.pinhole import in_picture
 from defras_sim.geometry import Floats
-from defras_sim.scene import Scene
+from defras_sim.scene import Camera, Scene
 from defras_sim.surface import Surface
+from tests.monitoring.shapes import Deform, folded, wavy
+
+PLACES = np.array([[0.7, 0.15, 0.15], [0.15, 0.7, 0.15], [0.15, 0.15, 0.7], [1 / 3, 1 / 3, 1 / 3]])
+
+
+def hits_before(eye_m: Floats, place_m: Floats, corners_m: Floats) -> NDArray[np.bool_]:
+    """Which triangles (m, 3, 3), whichever way round, a ray meets before its place.
+
+    Moeller and Trumbore, Fast, minimum storage ray-triangle intersection (1997).
+    """
+    ray = place_m - eye_m
+    side, other = corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0]
+    across, start = np.cross(ray, other), eye_m - corners_m[:, 0]
+    determinant = np.einsum("md,md->m", side, across)
+    u = np.einsum("md,md->m", start, across) / determinant
+    turned = np.cross(start, side)
+    v = turned @ ray / determinant
+    share = np.einsum("md,md->m", turned, other) / determinant
+    return (u >= 0) & (v >= 0) & (u + v <= 1) & (share > 0) & (share < 1 - 1e-5)
+
+
+def ray_traced(surface: Surface, camera: Camera) -> SeenSurface:
+    """The same by asking every triangle about the ray to every place."""
+    corners = surface.vertices_m[surface.triangles]
+    eye = np.array(camera.position_m)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = np.flatnonzero(np.einsum("ij,ij->i", normal, eye - corners.mean(axis=1)) > 0.0)
+    samples = np.einsum("sk,tkd->tsd", PLACES, corners[facing]).reshape(-1, 3)
+    seen = np.array([not hits_before(eye, place, corners).any() for place in samples])
+    seen &= in_picture(camera, samples)
+    touched = np.zeros(len(surface.vertices_m), bool)
+    touched[surface.triangles[facing[seen.reshape(-1, 4).any(axis=1)]]] = True
+    chosen = facing[touched[surface.triangles[facing]].any(axis=1)]
+    return SeenSurface(chosen, corners[chosen], samples[seen])
+
+
+def placed(stretch: float, shift_m: tuple[float, float, float]) -> Deform:
+    """As large and as near as asked."""
+    return lambda points: points * stretch + shift_m
+
+
+@pytest.mark.parametrize(
+    "deform",
+    [
+        placed(1.0, (0.0, 0.0, 0.0)),
+        placed(3.0, (0.0, 0.0, 0.0)),
+        placed(1.0, (0.17, 0.0, 0.19)),
+        placed(1.0, (0.1, 0.0, 0.12)),
+        folded(),
+        folded(0.004),
+        *(wavy(seed) for seed in range(6)),
+        *(wavy(seed, 0.04) for seed in range(4)),
+    ],
+)
+def test_what_is_seen_is_what_rays_reach(
+    deform: Deform, slab: Callable[..., Surface], scene: Scene
+) -> None:
+    surface = slab(deform, cells=12)
+    found = seen_surface(surface, scene.depth_camera)
+    expected = ray_traced(surface, scene.depth_camera)
+    np.testing.assert_array_equal(found.triangles, expected.triangles)
+    np.testing.assert_array_equal(found.corners_m, expected.corners_m)
+    np.testing.assert_allclose(found.samples_m, expected.samples_m, atol=1e-15)
 
 
 def test_the_lower_face_of_a_resting_slab_is_never_seen(
@@ -27,18 +93,7 @@ def test_the_lower_face_of_a_resting_slab_is_never_seen(
 def test_tissue_under_a_flap_is_hidden_and_the_flaps_lower_face_is_seen(
     slab: Callable[..., Surface], scene: Scene
 ) -> None:
-    def fold(points: Floats) -> Floats:
-        """Bend the half x < 0 up and over towards the camera, around a 10 mm arc."""
-        radius = 0.01
-        angle = np.clip(-points[:, 0] / radius, 0.0, np.pi)
-        straight = np.maximum(-points[:, 0] - np.pi * radius, 0.0)
-        inner = radius - points[:, 2]
-        bent = np.column_stack(
-            [-inner * np.sin(angle) + straight, points[:, 1], radius - inner * np.cos(angle)]
-        )
-        return np.where(points[:, :1] < 0.0, bent, points)
-
-    surface = slab(fold)
+    surface = slab(folded())
     seen = seen_surface(surface, scene.depth_camera)
     on_lower = (~surface.upper)[surface.triangles[seen.triangles]].all(axis=1)
     lower_center = seen.corners_m[on_lower].mean(axis=1)
