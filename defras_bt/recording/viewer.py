@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TypeVar
+from typing import IO, TypeVar
 
 from rerun.experimental import ViewerClient
 
@@ -57,6 +59,27 @@ def viewer_command(timeline: Path, *options: str) -> list[str]:
     return [sys.executable, "-m", "rerun", str(timeline), "--bind", "127.0.0.1", *options]
 
 
+@contextmanager
+def viewer_process(
+    command: list[str], output: IO[bytes] | int
+) -> Iterator[subprocess.Popen[bytes]]:
+    """A viewer that ends with the block, together with the program that it starts for itself."""
+    viewer = subprocess.Popen(
+        command,
+        # CI keeps the viewer from asking about analytics.
+        env={**os.environ, "CI": "1"},
+        stdout=output,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
+    try:
+        yield viewer
+    finally:
+        with suppress(ProcessLookupError):  # it ended by itself
+            os.killpg(viewer.pid, signal.SIGTERM)
+        viewer.wait()
+
+
 def screenshot(
     run: Path, picture: Path, at_s: float | None = None, size_px: tuple[int, int] = (1600, 1000)
 ) -> None:
@@ -69,11 +92,7 @@ def screenshot(
     port = _free_port()
     window = ("--window-size", f"{size_px[0]}x{size_px[1]}")
     command = viewer_command(timeline, "--headless", "--port", str(port), *window)
-    with TemporaryFile() as said:
-        # CI keeps the viewer from asking about analytics.
-        viewer = subprocess.Popen(
-            command, env={**os.environ, "CI": "1"}, stdout=said, stderr=subprocess.STDOUT
-        )
+    with TemporaryFile() as said, viewer_process(command, said) as viewer:
         try:
             picture.write_bytes(_picture(viewer, port, at_s))
         except (TimeoutError, RuntimeError, ConnectionError) as error:
@@ -81,9 +100,6 @@ def screenshot(
             text = said.read().decode(errors="replace").strip()
             reason = _VULKAN_HELP if "adapter" in text.lower() else str(error)
             raise ViewerMissing(f"no picture of {timeline}: {reason}\n{text}") from error
-        finally:
-            viewer.terminate()
-            viewer.wait()
 
 
 def _picture(viewer: subprocess.Popen[bytes], port: int, at_s: float | None) -> bytes:

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 import socket
 import subprocess
 import time
@@ -9,7 +8,13 @@ from pathlib import Path
 import pytest
 
 from defras_bt.recording.timeline import TimelineRecorder
-from defras_bt.recording.viewer import ViewerMissing, screenshot, timeline_of, viewer_command
+from defras_bt.recording.viewer import (
+    ViewerMissing,
+    screenshot,
+    timeline_of,
+    viewer_command,
+    viewer_process,
+)
 from tests.recording.synthetic_run import SyntheticRun
 
 
@@ -41,17 +46,17 @@ def test_only_this_machine_can_reach_the_viewer(tmp_path: Path, short_run: Synth
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     command = viewer_command(tmp_path / "run.rrd", "--headless", "--port", str(port))
-    quiet = subprocess.DEVNULL
-    viewer = subprocess.Popen(command, env={**os.environ, "CI": "1"}, stdout=quiet, stderr=quiet)
-    try:
+    with viewer_process(command, subprocess.DEVNULL):
         for _ in range(400):
             if addresses := _listening(port):
                 break
             time.sleep(0.05)
         assert addresses == {"127.0.0.1"}
-    finally:
-        viewer.terminate()
-        viewer.wait()
+    for _ in range(100):
+        if not _listening(port):
+            return
+        time.sleep(0.05)
+    pytest.fail("the viewer outlives its block")
 
 
 def _listening(port: int) -> set[str]:
