@@ -3,7 +3,7 @@
 Everything but world, twin and drawing counts: checks of readings, monitoring, the tree with its
 reasons, the gate, and in a second run the recording. World and twin are stand-ins that cost next to
 nothing, and what they cost is subtracted; the cloud and the twin's surface have the size of real
-ones, so that sensing and monitoring do what they do in an operation.
+ones and change all the time, so that sensing and monitoring do what they do in an operation.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ from defras_sim.worlds.protocol import Command, Observation, PointCloud
 
 BARE = "bare py_trees"
 CLOUD_POINTS = 600
+_BREATH_M = 1e-4
 _CYCLE = ("reach", "open", "grasp", "pull", "move", "fold", "release")
 _POINTS: tuple[GridPoint, ...] = ((2, 4), (2, 5), (3, 4), (3, 5), (1, 4))
 
@@ -103,15 +104,15 @@ def _measured_once(tree_file: Path, scene: Scene, actions: int) -> Costs:
             bare.tick()
         spent_s.append(watch.take_s())
         bare.check()
-    own_s = plain["whole"] - plain["world and twin"] - plain["monitoring"]
+    own_s = plain["whole"] - plain["world and twin"]
     writing = [name for name in recorded if name.endswith("Recorder")]
     written_s = np.sum([recorded[name] for name in writing], axis=0)
     return {
         BARE: np.array(spent_s),
         "executive": own_s,
         "executive, recording": own_s + written_s,
-        "executive, recording, monitoring": own_s + written_s + plain["monitoring"],
-        "monitoring": plain["monitoring"],
+        "of it monitoring": plain["monitoring"],
+        "of it all else": own_s - plain["monitoring"],
         **{name: recorded[name] for name in writing},
     }
 
@@ -220,7 +221,10 @@ class _TimedWorld(BenchWorld):
 
 
 class _TimedTwin(Twin):
-    """A twin whose tissue rests, whatever is done to it."""
+    """A twin whose tissue breathes a little, whatever is done to it.
+
+    So no tick finds the surface of the one before, as while tissue is held.
+    """
 
     def __init__(self, scene: Scene, watch: Stopwatch) -> None:
         super().__init__(scene)
@@ -234,7 +238,9 @@ class _TimedTwin(Twin):
 
     def track(self, setpoints: Mapping[str, Pose], time_s: float) -> TissueState:
         with self._watch:
-            return self.state
+            surface = self.state.surface
+            risen_m = surface.vertices_m + [0.0, 0.0, _BREATH_M * np.sin(time_s)]
+            return replace(self.state, surface=replace(surface, vertices_m=risen_m))
 
 
 class _TimedMonitor(WarningMonitor):

@@ -38,8 +38,9 @@ def executive(
         f"Tree {tree}, a plan of {actions} actions, carried out {repeats} times; scene {scene}.",
         "CPU: of the thread that ticks, of each tick the least of all repeats. Wall: as it came. "
         "Ratios: of CPU time to bare py_trees.",
-        "executive: reading checks, tree, reasons, gate; recording: all files that are written "
-        "while a run lasts; monitoring: the comparison of each new cloud with the twin.",
+        "executive: monitoring (each new cloud against the twin), reading checks, tree, reasons, "
+        "gate; recording: all files that are written while a run lasts. Neither holds world, twin, "
+        "drawing, nor colours in pictures: the world delivers cloud and visibility.",
         f"Load of the machine ({os.cpu_count()} processors): {load}.",
     ]
     write_benchmark(out, "executive", "The executive's own time", {"Per tick": rows}, notes)

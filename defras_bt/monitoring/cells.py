@@ -128,7 +128,7 @@ def range_buffer(cells: Cells) -> NDArray[np.int64]:
 def home(cells: Cells, at: Floats) -> tuple[tuple[int, int, int], float, float]:
     """The cube nearest to a place (3,), and what :func:`ring_m` asks for.
 
-    These are the least distance of the box's nearest place to a side of that cube, and the square
+    These are the least distance of the box's nearest place to a neighbouring cube, and the square
     of the distance to the box of all cubes, 0 for a place in it.
     """
     x, in_x, out_x = _along(cells, at[0], 0)
@@ -142,8 +142,10 @@ def _along(cells: Cells, at_m: float, axis: int) -> tuple[int, float, float]:
     along = at_m - cells.low_m[axis]
     nearest = min(max(along, 0.0), cells.shape[axis] * cells.side_m)
     cube = min(int(nearest / cells.side_m), cells.shape[axis] - 1)
-    rest = nearest - cube * cells.side_m
-    return cube, max(min(rest, cells.side_m - rest), 0.0), along - nearest
+    # Beyond the outermost cubes there is nothing that could be near.
+    below = nearest - cube * cells.side_m if cube > 0 else np.inf
+    above = (cube + 1) * cells.side_m - nearest if cube < cells.shape[axis] - 1 else np.inf
+    return cube, max(min(below, above), 0.0), along - nearest
 
 
 @jit

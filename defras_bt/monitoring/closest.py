@@ -61,7 +61,7 @@ def _search(points: Floats, corners: Floats) -> tuple[Floats, NDArray[np.int64],
     count = len(points)
     distance, index, weights = np.empty(count), np.empty(count, np.int64), np.empty((count, 3))
     centroid, radius, normal = _discs(corners)
-    cells = sorted_into_cells(centroid, spacing_m(centroid))
+    cells = sorted_into_cells(centroid, 1.5 * spacing_m(centroid))
     widest, rings, ranges = radius.max(), last_ring(cells), range_buffer(cells)
     nearest = 0
     for i in range(count):

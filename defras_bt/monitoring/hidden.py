@@ -22,7 +22,7 @@ from defras_sim.tissue.matrices import jit
 _TOLERANCE = 1e-5
 _BEHIND_M = 1e-9
 # Sides of tiles to sides of triangles: narrower tiles list less, but each triangle more often.
-_TILE = 0.7
+_TILE = 0.6
 
 
 @jit
@@ -57,9 +57,9 @@ def seen_places(
     left, right = boxes[:, 0].min(), boxes[:, 1].max()
     top, bottom = boxes[:, 2].min(), boxes[:, 3].max()
     area_px = max(right - left, 1.0) * max(bottom - top, 1.0)
-    tile = _TILE * np.sqrt(area_px / len(triangles))
-    columns, rows = int((right - left) / tile) + 1, int((bottom - top) / tile) + 1
-    first, listed = _tiles(boxes, left, top, tile, columns, rows)
+    per_px = np.sqrt(len(triangles) / area_px) / _TILE
+    columns, rows = int((right - left) * per_px) + 1, int((bottom - top) * per_px) + 1
+    first, listed = _tiles(boxes, left, top, per_px, columns, rows)
     pyramids = _pyramids(in_camera_m, triangles)
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -70,12 +70,13 @@ def seen_places(
             z = u * in_camera_m[a, 2] + v * in_camera_m[b, 2] + w * in_camera_m[c, 2]
             if z <= _BEHIND_M:
                 continue
-            across = intrinsics[0, 0] * x / z + intrinsics[0, 2]
-            down = intrinsics[1, 1] * y / z + intrinsics[1, 2]
+            inverse = 1.0 / z
+            across = intrinsics[0, 0] * x * inverse + intrinsics[0, 2]
+            down = intrinsics[1, 1] * y * inverse + intrinsics[1, 2]
             if not (-0.5 <= across <= size_px[0] - 0.5 and -0.5 <= down <= size_px[1] - 0.5):
                 continue
-            column = min(max(int((across - left) / tile), 0), columns - 1)
-            row = min(max(int((down - top) / tile), 0), rows - 1)
+            column = min(max(int((across - left) * per_px), 0), columns - 1)
+            row = min(max(int((down - top) * per_px), 0), rows - 1)
             at = column * rows + row
             seen[t, s] = not _hidden(x, y, z, t, pyramids, listed, first[at], first[at + 1])
     return seen
@@ -176,15 +177,15 @@ def _boxes_px(
 
 @jit
 def _tiles(
-    boxes: Floats, left: float, top: float, tile: float, columns: int, rows: int
+    boxes: Floats, left: float, top: float, per_px: float, columns: int, rows: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """What tile i lists, counted by columns: triangles ``listed[first[i] : first[i + 1]]``."""
     spans = np.empty((len(boxes), 4), np.int64)
     first = np.zeros(columns * rows + 1, np.int64)
     for t in range(len(boxes)):
         for k in range(2):
-            spans[t, k] = int((boxes[t, k] - left) / tile)
-            spans[t, 2 + k] = int((boxes[t, 2 + k] - top) / tile)
+            spans[t, k] = int((boxes[t, k] - left) * per_px)
+            spans[t, 2 + k] = int((boxes[t, 2 + k] - top) * per_px)
         for column in range(spans[t, 0], spans[t, 1] + 1):
             for row in range(spans[t, 2], spans[t, 3] + 1):
                 first[column * rows + row + 1] += 1

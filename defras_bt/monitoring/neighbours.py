@@ -71,6 +71,17 @@ def neighbourhood_medians(
                             continue
                     square[place], value[place] = apart, values[cells.order[other]]
         if found >= least:
-            ordered = np.sort(value[:found])
-            medians[cells.order[at]] = (ordered[(found - 1) // 2] + ordered[found // 2]) / 2
+            medians[cells.order[at]] = _median(value, found)
     return medians
+
+
+@jit
+def _median(values: Floats, count: int) -> float:
+    """Median of the first ``count`` of a few values, which are sorted on the way."""
+    for i in range(1, count):
+        value, place = values[i], i
+        while place > 0 and values[place - 1] > value:
+            values[place] = values[place - 1]
+            place -= 1
+        values[place] = value
+    return (values[(count - 1) // 2] + values[count // 2]) / 2

@@ -12,7 +12,7 @@ from defras_bt.monitoring.median import MedianMetric
 from defras_bt.monitoring.metric import Metric
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.monitoring.rest import MIN_REST_FRAMES, RestCalibration, calibrate_rest
-from defras_bt.monitoring.seen import seen_surface
+from defras_bt.monitoring.seen import SeenSurface, seen_surface
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
@@ -43,6 +43,7 @@ class WarningMonitor:
         self._raw_states: deque[Mapping[str, int]] = deque(maxlen=CONFIRMING_FRAMES)
         self._last: MonitorReading | None = None
         self._settling_until_s = -np.inf
+        self._seen: tuple[Surface, SeenSurface] | None = None
 
     @property
     def calibration(self) -> Mapping[str, RestCalibration]:
@@ -56,7 +57,7 @@ class WarningMonitor:
         """
         if cloud is not None and cloud.stamp_s > self._rest_stamp_s:
             self._rest_stamp_s = cloud.stamp_s
-            seen = seen_surface(surface, self._scene.depth_camera)
+            seen = self._seen_of(surface)
             for metric in self._metrics:
                 values = self._rest[metric.name]
                 value = metric.measure(cloud.points_m, seen).value_m
@@ -81,7 +82,7 @@ class WarningMonitor:
             return self._unknown(time_s)
         if self._last is not None and cloud.stamp_s == self._last.stamp_s:
             return self._last
-        seen = seen_surface(self._surface_at(cloud.stamp_s), self._scene.depth_camera)
+        seen = self._seen_of(self._surface_at(cloud.stamp_s))
         mu: dict[str, float] = {}
         raw: dict[str, int] = {}
         per_point = np.zeros(0)
@@ -145,6 +146,12 @@ class WarningMonitor:
         while self._surfaces[0][0] < time_s - _HISTORY_S:
             self._surfaces.popleft()
 
+    def _seen_of(self, surface: Surface) -> SeenSurface:
+        """What the camera sees of a surface; of one that did not change it is known already."""
+        if self._seen is None or self._seen[0] is not surface:
+            self._seen = (surface, seen_surface(surface, self._scene.depth_camera))
+        return self._seen[1]
+
     def _surface_at(self, stamp_s: float) -> Surface:
         """The twin's surface when a cloud was taken, between two remembered ones.
 
@@ -155,6 +162,8 @@ class WarningMonitor:
         if after == 0 or after == len(times):
             return self._surfaces[min(after, len(times) - 1)][1]
         (start, before), (end, then) = self._surfaces[after - 1], self._surfaces[after]
+        if before is then or stamp_s == end:
+            return then
         share = (stamp_s - start) / (end - start)
         vertices: Floats = (1 - share) * before.vertices_m + share * then.vertices_m
         return Surface(vertices, then.triangles, then.upper, then.rest_xy_m)
