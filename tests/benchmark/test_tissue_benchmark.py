@@ -76,8 +76,6 @@ def test_targets_compare_computing_on_the_same_motions(case):
 
 @pytest.mark.parametrize("model", [FelupeTissue, BulletSlab, MujocoSlab])
 def test_other_models_follow_the_first_millimetres(model):
-    if model is MujocoSlab:
-        pytest.importorskip("mujoco")
     made = (
         model(CENTRE_LIFT, "neo_hookean", (4, 4, 1))
         if model is FelupeTissue
