@@ -32,6 +32,8 @@ from defras_bt.recording.record import Recorder, RunInfo, RunSummary, TickRecord
 from defras_bt.recording.summary import SummaryRecorder
 from defras_bt.recording.timeline import TimelineRecorder
 from defras_bt.recording.versions import versions
+from defras_sim.camera.depth import depth_cloud_m
+from defras_sim.camera.ray_caster import RayCaster
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
@@ -40,7 +42,6 @@ from defras_sim.twin import Twin
 from defras_sim.worlds.protocol import Command, Observation, PointCloud
 
 BARE = "bare py_trees"
-CLOUD_POINTS = 600
 _BREATH_M = 1e-4
 _CYCLE = ("reach", "open", "grasp", "pull", "move", "fold", "release")
 _POINTS: tuple[GridPoint, ...] = ((2, 4), (2, 5), (3, 4), (3, 5), (1, 4))
@@ -199,8 +200,9 @@ class _TimedWorld(BenchWorld):
         super().__init__(scene)
         self._watch = watch
         self._rng = np.random.default_rng(0)
-        self._points_m = _points_on(surface, CLOUD_POINTS, self._rng)
         self._noise_m = scene.depth_camera.noise_sd_m
+        camera = scene.depth_camera.model_copy(update={"noise_sd_m": 0.0})
+        self._points_m = depth_cloud_m(camera, surface, RayCaster(surface), self._rng)
         self._every = max(1, round(scene.depth_camera.period_s / scene.tick_s))
         self._seen = PointCloud(0.0, self._points_m)
 
@@ -295,12 +297,6 @@ def _recorders(folder: Path) -> list[Recorder]:
         DecisionRecorder(folder / DECISIONS_FILE),
         SummaryRecorder(),
     ]
-
-
-def _points_on(surface: Surface, count: int, rng: np.random.Generator) -> Floats:
-    """Points (count, 3) spread over the upper side of a surface."""
-    upper = surface.vertices_m[surface.upper]
-    return upper[rng.integers(len(upper), size=count)] + rng.normal(0.0, 1e-4, (count, 3))
 
 
 def _info(scene: Scene, executive: Executive) -> RunInfo:

@@ -8,7 +8,7 @@ import numpy as np
 
 from defras_bt.monitoring.closest import closest_on_triangles
 from defras_bt.monitoring.metric import Measurement
-from defras_bt.monitoring.neighbours import neighbourhood_medians
+from defras_bt.monitoring.neighbours import worst_median
 from defras_bt.monitoring.seen import SeenSurface
 from defras_sim.geometry import Floats
 
@@ -37,17 +37,11 @@ class LocalMetric:
         if len(cloud_m) < self.min_neighbours or len(seen.corners_m) == 0:
             return Measurement(float("nan"), np.full(len(cloud_m), np.nan))
         distance = closest_on_triangles(cloud_m, seen.corners_m).distance_m
-        smooth = self.smoothed_m(cloud_m, distance)
-        known = np.isfinite(smooth)
-        worst = float(smooth[known].max()) if known.mean() > 0.5 else float("nan")
-        return Measurement(worst, distance)
-
-    def smoothed_m(self, cloud_m: Floats, distance_m: Floats) -> Floats:
-        """Median of ``distance_m`` (n,) over each point's neighbourhood, NaN where too few."""
-        return neighbourhood_medians(
+        worst, known = worst_median(
             np.ascontiguousarray(cloud_m),
-            distance_m,
+            distance,
             self.diameter_m / 2,
             self.min_neighbours,
             self.max_neighbours,
         )
+        return Measurement(worst if 2 * known > len(cloud_m) else float("nan"), distance)

@@ -39,40 +39,70 @@ def nearest_m(points_m: Floats, others_m: Floats) -> Floats:
 
 
 @jit
-def neighbourhood_medians(
+def worst_median(
     points_m: Floats, values: Floats, radius_m: float, least: int, most: int
-) -> Floats:
-    """Median (n,) of ``values`` (n,) over the points (n, 3) less than ``radius_m`` away.
+) -> tuple[float, int]:
+    """Largest median of ``values`` (n,) over the neighbourhood of any point (n, 3); how many count.
 
-    Each point is its own neighbour. Of more than ``most`` neighbours the nearest count; of fewer
-    than ``least`` there is no median, but NaN.
+    Neighbours are less than ``radius_m`` away; each point is its own. Of more than ``most`` of them
+    the nearest count; a point with fewer than ``least`` does not count. NaN if none does.
     """
     cells = sorted_into_cells(points_m, radius_m)
     ranges, count = range_buffer(cells), len(points_m)
-    # A ring is as wide as the radius or wider, so none but the first can hold a neighbour.
-    square, value = np.empty(most), np.empty(most)
-    medians = np.full(count, np.nan)
+    square, value = np.empty(count), np.empty(count)
+    worst, known = -np.inf, 0
     for at in range(count):
-        p, found = cells.points_m[at], 0
-        cube, _, _ = home(cells, p)
+        x, y, z = cells.points_m[at, 0], cells.points_m[at, 1], cells.points_m[at, 2]
+        cube, _, _ = home(cells, cells.points_m[at])
+        found = 0
+        # A ring is as wide as the radius or wider, so none but the first can hold a neighbour.
         for ring in range(2):
             for r in range(ring_ranges(cells, cube, ring, ranges)):
                 for other in range(ranges[r, 0], ranges[r, 1]):
-                    q = cells.points_m[other]
-                    x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
-                    apart = x * x + y * y + z * z
-                    if apart >= radius_m * radius_m:
-                        continue
-                    if found < most:
-                        place, found = found, found + 1
-                    else:
-                        place = int(np.argmax(square))
-                        if apart >= square[place]:
-                            continue
-                    square[place], value[place] = apart, values[cells.order[other]]
-        if found >= least:
-            medians[cells.order[at]] = _median(value, found)
-    return medians
+                    u = cells.points_m[other, 0] - x
+                    v = cells.points_m[other, 1] - y
+                    w = cells.points_m[other, 2] - z
+                    # Written always and kept if near: processors guess badly which are.
+                    square[found] = u * u + v * v + w * w
+                    value[found] = values[cells.order[other]]
+                    found += square[found] < radius_m * radius_m
+        if found < least:
+            continue
+        known += 1
+        if found > most:
+            _nearest_first(square, value, found, most)
+            found = most
+        above = 0
+        for i in range(found):
+            above += value[i] > worst
+        # A median is above what half of its values are above.
+        if above >= found - found // 2:
+            worst = max(worst, _median(value, found))
+    return worst if known > 0 else np.nan, known
+
+
+@jit
+def _nearest_first(square: Floats, value: Floats, count: int, most: int) -> None:
+    """Put the ``most`` nearest of the first ``count`` first, in any order (Hoare's selection)."""
+    low, high = 0, count - 1
+    while low < high:
+        pivot, i, j = square[(low + high) // 2], low, high
+        while i <= j:
+            while square[i] < pivot:
+                i += 1
+            while square[j] > pivot:
+                j -= 1
+            if i <= j:
+                square[i], square[j] = square[j], square[i]
+                value[i], value[j] = value[j], value[i]
+                i += 1
+                j -= 1
+        if most - 1 <= j:
+            high = j
+        elif most - 1 >= i:
+            low = i
+        else:
+            return
 
 
 @jit
