@@ -1,4 +1,4 @@
-"""The closest point of a triangle surface, exactly, a few tenths of a millisecond for a cloud."""
+"""The closest point of a triangle surface, exactly, in half a millisecond for a cloud."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def closest_on_triangles(points_m: Floats, corners_m: Floats) -> Closest:
 
     Nothing nearer is missed: a triangle is left out only if the disc around it, in its plane about
     its centroid, is farther away than the best so far. Of several triangles equally near, as at an
-    edge, the first counts. 600 points against 1,200 triangles need 0.2 ms.
+    edge, the first counts. 1,300 points against 1,200 triangles need 0.6 ms.
 
     Raises:
         ValueError: there is no triangle, or a number is not finite.
@@ -62,6 +62,7 @@ def _search(points: Floats, corners: Floats) -> tuple[Floats, NDArray[np.int64],
     distance, index, weights = np.empty(count), np.empty(count, np.int64), np.empty((count, 3))
     centroid, radius, normal = _discs(corners)
     cells = sorted_into_cells(centroid, 1.5 * spacing_m(centroid))
+    radius, normal = radius[cells.order], normal[cells.order]
     widest, rings, ranges = radius.max(), last_ring(cells), range_buffer(cells)
     nearest = 0
     for i in range(count):
@@ -75,18 +76,18 @@ def _search(points: Floats, corners: Floats) -> tuple[Floats, NDArray[np.int64],
                 break
             for r in range(ring_ranges(cells, cube, ring, ranges)):
                 for at in range(ranges[r, 0], ranges[r, 1]):
-                    t = cells.order[at]
                     x = p[0] - cells.points_m[at, 0]
                     y = p[1] - cells.points_m[at, 1]
                     z = p[2] - cells.points_m[at, 2]
                     away = x * x + y * y + z * z
-                    if away > (best + radius[t]) ** 2:
+                    if away > (best + radius[at]) ** 2:
                         continue
-                    height = x * normal[t, 0] + y * normal[t, 1] + z * normal[t, 2]
+                    height = x * normal[at, 0] + y * normal[at, 1] + z * normal[at, 2]
                     # From the triangle's disc to the point: as far up as sideways beyond the rim.
-                    beside = max(np.sqrt(max(away - height * height, 0.0)) - radius[t], 0.0)
+                    beside = max(np.sqrt(max(away - height * height, 0.0)) - radius[at], 0.0)
                     if height * height + beside * beside > square * _ROUNDING:
                         continue
+                    t = cells.order[at]
                     other, its_weight = _distance(p, corners, t)
                     if other < square or (other == square and t < nearest):
                         square, weight, nearest = other, its_weight, t

@@ -24,16 +24,18 @@ def nearest_m(points_m: Floats, others_m: Floats) -> Floats:
     cells = sorted_into_cells(others_m, np.sqrt(2.0) * spacing_m(others_m))
     distance, ranges, rings = np.empty(len(points_m)), range_buffer(cells), last_ring(cells)
     for i in range(len(points_m)):
-        p, best = points_m[i], np.inf
-        cube, inside, outside = home(cells, p)
+        x, y, z = points_m[i, 0], points_m[i, 1], points_m[i, 2]
+        cube, inside, outside = home(cells, points_m[i])
+        best = np.inf
         for ring in range(rings):
             if ring > 0 and ring_m(cells, ring, inside, outside) ** 2 > best:
                 break
             for r in range(ring_ranges(cells, cube, ring, ranges)):
                 for at in range(ranges[r, 0], ranges[r, 1]):
-                    q = cells.points_m[at]
-                    x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
-                    best = min(best, x * x + y * y + z * z)
+                    u = cells.points_m[at, 0] - x
+                    v = cells.points_m[at, 1] - y
+                    w = cells.points_m[at, 2] - z
+                    best = min(best, u * u + v * v + w * w)
         distance[i] = np.sqrt(best)
     return distance
 
@@ -50,6 +52,7 @@ def worst_median(
     cells = sorted_into_cells(points_m, radius_m)
     ranges, count = range_buffer(cells), len(points_m)
     square, value = np.empty(count), np.empty(count)
+    ordered, reach = values[cells.order], radius_m * radius_m
     worst, known = -np.inf, 0
     for at in range(count):
         x, y, z = cells.points_m[at, 0], cells.points_m[at, 1], cells.points_m[at, 2]
@@ -63,9 +66,9 @@ def worst_median(
                     v = cells.points_m[other, 1] - y
                     w = cells.points_m[other, 2] - z
                     # Written always and kept if near: processors guess badly which are.
-                    square[found] = u * u + v * v + w * w
-                    value[found] = values[cells.order[other]]
-                    found += square[found] < radius_m * radius_m
+                    apart = u * u + v * v + w * w
+                    square[found], value[found] = apart, ordered[other]
+                    found += int(apart < reach)
         if found < least:
             continue
         known += 1
