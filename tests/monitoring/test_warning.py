@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from defras_bt.monitoring.seen import SeenSurface, seen_surface
 from defras_bt.monitoring.warning import WarningMonitor
 from defras_sim.geometry import Floats
-from defras_sim.scene import Scene
+from defras_sim.scene import Camera, Scene
 from defras_sim.surface import Surface
 from defras_sim.worlds.protocol import PointCloud
 
@@ -116,6 +117,24 @@ def test_a_changed_twin_starts_with_a_clean_slate(
     reading = rested.reading(PointCloud(2.1, take_cloud(shape, 1)), shape, 2.1)
     assert reading.warning_state["local"] == 0
     assert reading.mu_m["local"] < 0.0005
+
+
+def test_a_surface_that_did_not_change_is_looked_at_once(
+    rested: WarningMonitor, slab: Slab, take_cloud: Take, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked_at: list[Surface] = []
+
+    def look(surface: Surface, camera: Camera) -> SeenSurface:
+        looked_at.append(surface)
+        return seen_surface(surface, camera)
+
+    monkeypatch.setattr("defras_bt.monitoring.warning.seen_surface", look)
+    still, moved = slab(), slab(raised(0.009))
+    for tick, surface in enumerate([still, still, still, moved, moved]):
+        time = 2.0 + 0.1 * tick
+        reading = rested.reading(PointCloud(time, take_cloud(still, tick)), surface, time)
+        assert (reading.mu_m["local"] > 0.006) == (surface is moved)
+    assert [id(surface) for surface in looked_at] == [id(still), id(moved)]
 
 
 class TestRelease:
