@@ -65,8 +65,9 @@ def _cut(corners: Floats, through: Floats, shared: NDArray[np.bool_]) -> Floats 
     # Moeller and Trumbore, J. Graphics Tools 2 (1997), 21-28.
     across = np.cross(way, second)
     determinant = np.sum(first * across, axis=1)
-    scale = np.linalg.norm(first, axis=1) * np.linalg.norm(across, axis=1)
-    crossing = np.abs(determinant) > _ROUNDING * scale
+    # Not the length of ``across``: of parallel sides that is itself nothing but rounding.
+    lengths = np.linalg.norm(np.stack([first, second, way]), axis=2)
+    crossing = np.abs(determinant) > _ROUNDING * lengths.prod(axis=0)
     inverse = np.divide(1.0, determinant, out=np.zeros_like(determinant), where=crossing)
     from_origin = start - origin
     u = inverse * np.sum(from_origin * across, axis=1)
