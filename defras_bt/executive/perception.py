@@ -11,7 +11,7 @@ from defras_bt.executive.grips import GripTracker
 from defras_bt.learning.buffer import KeyframeBuffer
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.monitoring.warning import WarningMonitor
-from defras_bt.recording.operator_state import NOBODY, OperatorState
+from defras_bt.recording.operator_state import NOBODY, Mode, OperatorState
 from defras_bt.sensing.arms import ArmPlausibility
 from defras_bt.sensing.freshness import stale
 from defras_bt.sensing.latest import LatestReadings
@@ -51,7 +51,7 @@ class Perception:
         sensed = sense(self._latest.update(observation), scene)
         missing = {
             **self._standstill(sensed.time_s),
-            **self._arms.faults(sensed, driven_by_hand=operator.forbids is not None),
+            **self._arms.faults(sensed, driven_by_hand=operator.mode is Mode.TAKEN_OVER),
             **stale(sensed, scene),
         }
         if self._grips.update(sensed, unsound=missing):

@@ -164,6 +164,18 @@ class TestUnlikelyReadings:
         senses.bench.put("psm1", home_m)
         assert senses.look().missing == ()
 
+    @pytest.mark.parametrize(
+        ("mode", "believed"), [(Mode.PAUSED, False), (Mode.STOPPED, False), (Mode.TAKEN_OVER, True)]
+    )
+    def test_only_driving_by_hand_explains_a_jump(self, senses, mode, believed):
+        senses.look()
+        senses.bench.put("psm1", senses.bench.tip_m() + [0.02, 0.0, 0.0])
+        assert senses.look().missing
+        senses.operator = OperatorState(mode, "the operator wants it so")
+        senses.look()
+        senses.operator = NOBODY
+        assert (senses.look().missing == ()) is believed
+
     def test_messages_that_overtake_each_other_do_not_turn_time_back(self, senses):
         world = senses.bench.world
         old = world.observe()
