@@ -13,6 +13,7 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from defras_bt.benchmark.fault_cases import MORE, drawn_fault, patient
+from defras_bt.benchmark.fault_errors import undeclared
 from defras_bt.benchmark.fault_judge import (
     NUMBERS,
     RECORDING,
@@ -23,13 +24,11 @@ from defras_bt.benchmark.fault_judge import (
     verdict,
 )
 from defras_bt.executive.deadline import interrupting
-from defras_bt.executive.executive import ExecutiveFailed
 from defras_bt.executive.operation import Operation, operate
-from defras_bt.faults.faults import FaultInjection, Faults
-from defras_bt.faults.system import DiskFull
+from defras_bt.faults.faults import KINDS, FaultInjection, Faults
+from defras_bt.faults.system import DiskFull, Killed
 from defras_bt.planning.preparation import Preparation, prepare
 from defras_bt.recording.bag import BagRecorder
-from defras_bt.recording.composite import RecordingFailed
 from defras_bt.recording.record import Recorder
 from defras_bt.recording.summary import SummaryRecorder
 from defras_bt.recording.timeline import TimelineRecorder
@@ -42,6 +41,8 @@ LONGEST_HANG_S = 5.0
 # So often the patient is held in more places than believed: learning takes its time.
 MORE_EVERY = 5
 _KILLED_WITHIN_S = 300.0
+# How a run ends that the executive ended itself.
+_DECIDED = ("goal", "human", "not_reached")
 _BROKEN_RECORDERS = {"timeline": (TIMELINE,), "recording": (RECORDING,)}
 
 
@@ -97,10 +98,8 @@ def _judged(operation: Operation, faults: Faults, out: Path) -> Verdict:
     broke = ""
     try:
         _operate(operation, injection, out, witness)
-    except (ExecutiveFailed, RecordingFailed):
-        pass  # both say how the run ended; the witness heard it
     except Exception as error:  # noqa: BLE001  (that is what the campaign looks for)
-        broke = f"{type(error).__name__}: {error}"
+        broke = "; ".join(undeclared(error, faults))
     end_s = witness.moments[-1].time_s if witness.moments else 0.0
     lost = lost_recordings(out, _until_s(faults, end_s))
     return verdict(witness, injection.trips, lost, broke)
@@ -201,8 +200,15 @@ def by_run(runs: Sequence[FaultRun]) -> list[dict[str, Any]]:
 
 
 def passed(runs: Sequence[FaultRun]) -> bool:
-    """Whether nothing went wrong that should not."""
+    """Whether nothing went wrong that should not, and every run ended as its fault allows."""
     return not any(
-        v.late or v.wrong or v.lost or v.broke or not v.reason
-        for v in (run.verdict for run in runs)
+        v.late or v.wrong or v.lost or v.broke or not v.reason or v.outcome not in _endings(kind)
+        for kind, v in ((run.kind, run.verdict) for run in runs)
     )
+
+
+def _endings(kind: str) -> tuple[str, ...]:
+    """The outcomes that a fault of ``kind`` may lead to."""
+    if kind == Killed.kind:
+        return ("killed",)
+    return (*_DECIDED, "error") if KINDS[kind].ends_runs_with else _DECIDED

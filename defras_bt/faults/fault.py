@@ -19,10 +19,15 @@ class Fault(BaseModel):
 
     A subclass is one kind of fault: its docstring says in a sentence what goes wrong, ``kind`` is
     its name in files, and :meth:`injector` puts it to work.
+
+    ``ends_runs_with`` and ``ends_recorders_with`` are the exceptions that it may end a run or a
+    recorder with; a judge takes any other for a mistake in the program.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     kind: ClassVar[str]
+    ends_runs_with: ClassVar[tuple[type[Exception], ...]] = ()
+    ends_recorders_with: ClassVar[tuple[type[Exception], ...]] = ()
 
     start_s: Seconds = Field(default=0.0, description="when it begins")
     duration_s: Annotated[float, Field(gt=0)] | None = Field(

@@ -15,7 +15,7 @@ from py_trees.behaviour import Behaviour
 from defras_bt.executive.node import Node
 from defras_bt.executive.wildcard import path_matches
 from defras_bt.faults.fault import Fault
-from defras_bt.faults.system import DiskFull, NodeFault, NodeHangs
+from defras_bt.faults.system import DiskFull, InjectedFault, NodeFault, NodeHangs
 from defras_bt.planning.plan import GridPoint, Plan, Situation
 from defras_bt.planning.planner import Planner
 from defras_bt.planning.program import PlanningTimeout
@@ -24,10 +24,6 @@ from defras_sim.geometry import Pose
 from defras_sim.scene import Scene
 from defras_sim.tissue.state import TissueState
 from defras_sim.twin import Twin
-
-
-class InjectedFault(RuntimeError):
-    """What a node raises because a fault file says so."""
 
 
 class FaultyTwin(Twin):

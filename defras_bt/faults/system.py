@@ -11,6 +11,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from defras_bt.executive.deadline import TreeStuck
 from defras_bt.faults.fault import Fault, Injector
 from defras_sim.scene import Scene
 from defras_sim.worlds.error import WorldError
@@ -50,6 +51,7 @@ class WorldLost(Fault):
     """The connection to the world breaks: its next step fails."""
 
     kind: ClassVar[str] = "world_lost"
+    ends_runs_with: ClassVar[tuple[type[Exception], ...]] = (WorldError,)
 
     def injector(self, scene: Scene, rng: np.random.Generator) -> Injector:
         return _WorldLost(self, rng)
@@ -139,22 +141,29 @@ class NodeFault(ServiceFault):
     node: str = Field(default="**/act/*", min_length=1, description="path; *, ? and ** are wild")
 
 
+class InjectedFault(RuntimeError):
+    """What a node raises because a fault file says so."""
+
+
 class NodeRaises(NodeFault):
     """A node raises an exception."""
 
     kind: ClassVar[str] = "node_raises"
+    ends_runs_with: ClassVar[tuple[type[Exception], ...]] = (InjectedFault,)
 
 
 class NodeHangs(NodeFault):
     """A node never returns."""
 
     kind: ClassVar[str] = "node_hangs"
+    ends_runs_with: ClassVar[tuple[type[Exception], ...]] = (TreeStuck,)
 
 
 class DiskFull(ServiceFault):
     """Nothing more can be written by one recorder, or by all."""
 
     kind: ClassVar[str] = "disk_full"
+    ends_recorders_with: ClassVar[tuple[type[Exception], ...]] = (OSError,)
     recorder: RecorderName = "recording"
 
 

@@ -68,6 +68,7 @@ def test_faults_are_drawn_from_their_seed_alone(kind: str) -> None:
         ("frozen", {"goal", "human"}),
         ("grasp_lost", {"goal", "human", "not_reached"}),
         ("node_raises", {"error"}),
+        ("world_lost", {"error"}),
         ("disk_full", {"goal", "human"}),
         ("killed", {"killed"}),
     ],
@@ -88,6 +89,51 @@ def test_a_guard_that_does_not_work_is_found_out(monkeypatch: pytest.MonkeyPatch
     assert run.verdict.late > 0
     assert not passed([run])
     assert by_kind([run])[-1]["motion later than one tick"] == run.verdict.late
+
+
+def _breaks(*_: object) -> None:
+    raise KeyError("a mistake in the program")
+
+
+@pytest.mark.parametrize("kind", ["frozen", "node_raises", "world_lost"])
+def test_a_tick_that_breaks_by_itself_fails_the_campaign(
+    monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    """Also where the fault itself may end the run: the exception is not the fault's."""
+    monkeypatch.setattr("defras_bt.executive.gate.CommandGate.check", _breaks)
+    run = fault_run(kind, 0, PREPARED, "fras")
+    assert run.verdict.outcome == "error"
+    assert "KeyError: 'a mistake in the program'" in run.verdict.broke
+    assert by_kind([run])[-1]["uncaught exceptions"] == 1
+    assert not passed([run])
+
+
+def test_a_recorder_that_breaks_by_itself_fails_the_campaign(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In the run's numbers no fault has a part, and all else may go as it should."""
+    monkeypatch.setattr("defras_bt.benchmark.fault_judge.Witness.finish", _breaks)
+    monkeypatch.setattr("defras_bt.benchmark.faults.MAX_TIME_S", 1.0)
+    run = fault_run("node_raises", 0, PREPARED, "fras")
+    assert "KeyError: 'a mistake in the program'" in run.verdict.broke
+    assert not passed([run])
+
+
+@pytest.mark.parametrize(
+    ("kind", "outcome", "fine"),
+    [
+        ("frozen", "human", True),
+        ("frozen", "error", False),
+        ("frozen", "none", False),
+        ("node_hangs", "error", True),
+        ("killed", "killed", True),
+        ("killed", "goal", False),
+    ],
+)
+def test_a_run_ends_only_as_its_fault_allows(kind: str, outcome: str, fine: bool) -> None:
+    witness = Witness()
+    witness.outcome, witness.reason = outcome, "done"
+    assert passed([FaultRun(kind, 0, 1.0, verdict(witness, [], []))]) is fine
 
 
 def test_tables_count_what_was_judged() -> None:

@@ -15,11 +15,11 @@ from defras_bt.faults.services import (
     FaultyPlanner,
     FaultyTwin,
     FullDisk,
-    InjectedFault,
     NodeBreaker,
 )
 from defras_bt.faults.system import (
     DiskFull,
+    InjectedFault,
     NodeHangs,
     NodeRaises,
     PlannerTimesOut,
