@@ -14,6 +14,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
+from defras_sim.yaml_aliases import alias_fault
+
 Location = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -76,14 +78,17 @@ def read_yaml(file: Path) -> YamlSource:
     """Read a YAML 1.2 file.
 
     Raises:
-        InvalidFile: the file cannot be read, is not UTF-8, is not YAML, or is not a mapping.
+        InvalidFile: the file cannot be read, is not UTF-8, is not YAML, is not a mapping, or has
+            aliases that stand for too much.
     """
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidFile([Fault(file, 1, 1, f"cannot be read: {error}")]) from error
     try:
-        document = YAML(typ="rt", pure=True).load(text)
+        # Most files have no alias, and need not be parsed twice.
+        too_much = alias_fault(text) if "*" in text else None
+        document = None if too_much else YAML(typ="rt", pure=True).load(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
@@ -91,6 +96,8 @@ def read_yaml(file: Path) -> YamlSource:
         raise InvalidFile([Fault(file, line, column, message)]) from error
     except (*_UNREADABLE, *_MALFORMED_TAG) as error:
         raise InvalidFile([Fault(file, 1, 1, f"not valid YAML: {error}")]) from error
+    if too_much is not None:
+        raise InvalidFile([Fault(file, too_much.line, too_much.column, too_much.message)])
     if not isinstance(document, CommentedMap):
         raise InvalidFile([Fault(file, 1, 1, "should hold a mapping of keys to values at the top")])
     places: dict[Location, tuple[Path, int, int]] = {(): (file, 1, 1)}
