@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +11,7 @@ from defras_bt.executive.blackboard import Blackboard, Grip
 from defras_bt.planning.plan import GridPoint
 from defras_sim.geometry import Pose
 from defras_sim.scene import Scene
+from defras_sim.tissue.grasp import NothingToGrasp
 from defras_sim.worlds.protocol import Observation
 
 
@@ -31,23 +32,27 @@ class GripTracker:
     def __init__(self, board: Blackboard, twin: HoldsTissue) -> None:
         self._board = board
         self._twin = twin
+        self.contradictions: Mapping[str, str] = {}
+        """A sentence for each jaw that says, as of the latest update, what cannot be."""
 
     def update(self, observation: Observation, unsound: Collection[str] = ()) -> bool:
         """Take over what the jaws say; True if any grip began or ended.
 
-        An arm whose reading is ``unsound``, or whose jaw does not tell, holds what it held.
-
-        Raises:
-            ValueError: a jaw holds something where the twin has no tissue.
+        An arm whose reading is ``unsound``, or whose jaw does not tell, holds what it held. A jaw
+        that says it took tissue where the twin has none is not believed: see ``contradictions``.
         """
-        changed = False
+        changed, contradictions = False, {}
         for name, arm in observation.arms.items():
             if name in unsound or arm.grasped is None:
                 continue
             holding = name in self._board.grips
             if arm.grasped and not holding:
                 tip = arm.setpoint_tissue_from_tip
-                self._twin.grasp(name, tip)
+                try:
+                    self._twin.grasp(name, tip)
+                except NothingToGrasp as miss:
+                    contradictions[name] = f"{name} says that it holds tissue, but {miss}"
+                    continue
                 self._board.grips[name] = Grip(self._point_of(name, tip), tip)
                 changed = True
             elif not arm.grasped and holding:
@@ -58,6 +63,7 @@ class GripTracker:
                 self._board.last_learning = None
                 self._board.unexplained = False
                 changed = True
+        self.contradictions = contradictions
         return changed
 
     def _point_of(self, arm: str, tip: Pose) -> GridPoint:

@@ -62,6 +62,7 @@ class Perception:
                 self._monitor.tissue_grasped()
             else:
                 self._monitor.tissue_released(sensed.time_s)
+        missing |= self._grips.contradictions
         # Where nobody knows what a holding arm does, the twin cannot say what the tissue does.
         state, force_n, reading = None, float("nan"), None
         if not any(name in missing for name in board.grips):
@@ -106,7 +107,8 @@ class Perception:
         return self._monitor.reading(sensed.cloud, state.surface, sensed.time_s)
 
     def _count_force(self, force_n: float, tick_s: float) -> None:
-        over = np.isnan(force_n) or force_n > self._force_threshold_n
+        # So written, a force or a threshold that is not a number counts as over.
+        over = not force_n <= self._force_threshold_n
         self._board.force_over_s = self._board.force_over_s + tick_s if over else 0.0
 
 

@@ -12,6 +12,7 @@ from defras_bt.executive.perception import Perception
 from defras_bt.executive.testing import EPSILON_N, MU_M, NodeBench
 from defras_bt.recording.operator_state import NOBODY, Mode, OperatorState
 from defras_sim.geometry import Pose
+from defras_sim.tissue.grasp import NothingToGrasp
 from defras_sim.worlds.protocol import JAW_CLOSED_RAD, JAW_OPEN_RAD, ArmCommand, Command
 
 NAN = float("nan")
@@ -264,10 +265,18 @@ class TestGrips:
         assert set(bench.board.grips) == bench.twin.holding == {"psm1"}
         assert not np.isnan(senses.look().force_n)
 
-    def test_a_grip_where_the_twin_has_no_tissue_is_an_error(self, senses):
+    def test_a_grip_where_the_twin_has_no_tissue_is_a_reading_that_cannot_be(self, senses):
         def nothing_there(arm, tip):
-            raise ValueError("no tissue at the tip")
+            raise NothingToGrasp("the tip is 40.0 mm from the tissue")
 
+        senses.look()
+        seen = senses.bench.world.observe()
+        false = {**seen.arms, "psm2": replace(seen.arms["psm2"], grasped=True)}
         senses.bench.twin.grasp = nothing_there
-        with pytest.raises(ValueError, match="no tissue"):
-            senses.grasp()
+        inputs = senses.perception.update(99, replace(seen, arms=false))
+        assert inputs.missing == (
+            "psm2 says that it holds tissue, but the tip is 40.0 mm from the tissue",
+        )
+        assert senses.bench.board.grips == {}
+        senses.bench.world.step()
+        assert senses.look().missing == (), "a moment later the jaw tells the truth"
