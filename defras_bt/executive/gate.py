@@ -90,7 +90,7 @@ class CommandGate:
             jaws = {n: ArmCommand(jaw_rad=_jaw(arm)) for n, arm in proposed.command.arms.items()}
             return GateVerdict(Command(jaws), tuple(bound))
         rate = proposed.rate
-        if inputs.force_n > inputs.force_threshold_n:
+        if not inputs.force_n <= inputs.force_threshold_n:
             rate = min(rate, RATE_OVER_FORCE)
         observed = inputs.observation.arms
         # A jaw that does not tell may hold tissue.

@@ -137,6 +137,8 @@ class ForceAccepted(Guard):
         force_n, limit_n = board.inputs.force_n, board.inputs.force_threshold_n
         if np.isnan(force_n):
             return self.fail(Code.FORCE_UNKNOWN, "the force is unknown")
+        if np.isnan(limit_n):
+            return self.fail(Code.FORCE_UNKNOWN, "the threshold of the force is not a number")
         if board.force_over_s >= self.parameters.patience_s:
             return self.fail(
                 Code.FORCE_TOO_HIGH,

@@ -17,6 +17,8 @@ from defras_bt.planning.scene_hash import scene_hash
 from defras_sim.scene import Scene
 
 SCHEMA: Literal["defras/preoperative/1"] = "defras/preoperative/1"
+# The largest threshold that a scene may state, too.
+HIGHEST_THRESHOLD_N = 50.0
 
 
 class InvalidPlanFile(ValueError):
@@ -52,7 +54,7 @@ def read_plan(file: Path) -> PreoperativeResult:
             f"{file}: cannot be read: {error.strerror}; give a file that `defras plan -o` wrote"
         ) from error
     try:
-        return _PlanFile.model_validate_json(content).result
+        result = _PlanFile.model_validate_json(content).result
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "the file"
@@ -60,6 +62,13 @@ def read_plan(file: Path) -> PreoperativeResult:
             f"{file}: {place}: {first['msg']}; valid are files with schema {SCHEMA}, as "
             "`defras plan` writes them"
         ) from error
+    # Every force check of an operation compares with it: written so that NaN fails.
+    if not 0.0 < result.force_threshold_n <= HIGHEST_THRESHOLD_N:
+        raise InvalidPlanFile(
+            f"{file}: result.force_threshold_n is {result.force_threshold_n} N; valid is a force "
+            f"above 0 N and up to {HIGHEST_THRESHOLD_N:g} N"
+        )
+    return result
 
 
 def load_plan(file: Path, scene: Scene) -> PreoperativeResult:

@@ -125,7 +125,7 @@ class SummaryRecorder:
             if record.force_n > 0:
                 self._force_sum_n += record.force_n
                 self._force_ticks += 1
-            self._ticks_over += record.force_n > self._started().force_threshold_n
+            self._ticks_over += not record.force_n <= self._started().force_threshold_n
         if record.true_force_n is not None and math.isfinite(record.true_force_n):
             self._force_true_max_n = max(self._force_true_max_n or 0.0, record.true_force_n)
 

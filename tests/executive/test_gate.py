@@ -94,6 +94,13 @@ def speed_m_s(command: Command, name: str = "psm1") -> float:
 class TestWithoutTrip:
     """Speed, rate and workspace."""
 
+    def test_a_threshold_that_is_not_a_number_slows(self):
+        known = inputs(force_n=0.1, force_threshold_n=NAN)
+        sent = check(go(0.004 * UP), 1.0, known).command
+        slowed = check(go(0.004 * UP), 1.0, inputs(force_n=0.31)).command
+        np.testing.assert_array_equal(sent.arms["psm1"].linear_m_s, slowed.arms["psm1"].linear_m_s)
+        assert speed_m_s(sent) < 0.004
+
     def test_a_slow_command_passes_unchanged(self):
         verdict = check(go(), 1.0, inputs())
         sent = verdict.command.arms["psm1"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -128,6 +130,20 @@ def test_jobs_change_nothing_and_scenes_pool(small, rehearsed):
     assert same_outcomes(one.executions, rehearsed[0].executions)
     forces_n = [e.force_max_n for result in (one, other) for e in result.executions]
     assert one.force_threshold_n == other.force_threshold_n == 2 * np.median(forces_n)
+
+
+@pytest.mark.parametrize("written", ["NaN", "Infinity", '"inf"', "-1", "0", "1e9"])
+def test_a_threshold_that_is_no_sensible_force_is_refused(small, rehearsed, tmp_path, written):
+    file = tmp_path / "plan.json"
+    save_plan(rehearsed[0], file)
+    plain = file.read_text()
+    limit_n = json.loads(plain)["result"]["force_threshold_n"]
+    file.write_text(
+        plain.replace(f'"force_threshold_n": {limit_n}', f'"force_threshold_n": {written}')
+    )
+    assert file.read_text() != plain
+    with pytest.raises(InvalidPlanFile, match=r"force_threshold_n is .*above 0 N and up to 50 N"):
+        load_plan(file, small)
 
 
 def test_plan_file_round_trip(small, rehearsed, tmp_path):
