@@ -20,6 +20,9 @@ from defras_sim.tissue.factorisation import NotPositiveDefinite
 
 # What is added to the tangent's diagonal first where it bends down, as a share of its median.
 _LEAST_SHIFT = 1e-6
+# Forces below this share of the residual are rounding. The tangent need not be looked at then; that
+# of tissue at rest which nothing holds has no factor.
+_NOTHING = 1e-6
 
 
 class Energy(Protocol):
@@ -91,6 +94,8 @@ class NewtonSolver:
         here = _Point(start_m.copy(), *energy.energy_and_gradient(start_m))
         if not np.isfinite(here.energy_j):
             return Solution(here.positions_m, False, 0)
+        if np.linalg.norm(here.gradient_n) <= _NOTHING * settings.residual_n:
+            return Solution(here.positions_m, True, 0)
         curvature = self._curvature = self._curvature or Curvature(start_m)
         iterations = factorisations = 0
         excess = np.inf

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from defras_sim.geometry import Pose
-from defras_sim.scene import Attachments, Roi, Scene, Tissue
+from defras_sim.scene import Attachments, ElementName, Roi, Scene, Tissue
 from defras_sim.tissue.model import TissueModel
 
 DENSITY, G, HEIGHT_M = 1000.0, 9.81, 0.005
@@ -108,6 +108,16 @@ def test_without_weight_rest_is_the_mesh_itself() -> None:
     raised(tissue, 0.02)
     tissue.release("psm1")
     np.testing.assert_array_equal(tissue.solve({}).nodes_m, tissue.mesh.nodes_m)
+
+
+@pytest.mark.parametrize("element", ["hexahedron20", "tetrahedron10"])
+def test_without_weight_it_stays_where_it_is_though_nothing_holds_it(element: ElementName) -> None:
+    tissue = heavy(gravity_m_s2=0.0, element=element)
+    tissue.set_hole_stiffness(np.zeros_like(tissue.hole_stiffness_n_per_m))
+    state = tissue.solve({})
+    assert state.converged
+    assert state.iterations == 0
+    np.testing.assert_array_equal(state.nodes_m, tissue.mesh.nodes_m)
 
 
 def test_the_softest_tissue_that_a_scene_may_have_finds_its_place() -> None:
