@@ -23,7 +23,7 @@ import numpy as np
 
 from defras_sim.geometry import Floats
 from defras_sim.rest_shape import FlatFace, Slab
-from defras_sim.scene import MaterialName, Tissue
+from defras_sim.scene import ElementName, MaterialName, Tissue
 from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.dent import Dent
 from defras_sim.tissue.discs import ROWS, disc_rows
@@ -63,18 +63,23 @@ class DentsOf:
     def at(self, centers_xy_m: Floats, radius_m: float, *, upper: bool) -> Dent:
         """Dents of the rows (3 discs,) of discs around ``centers_xy_m`` (discs, 2).
 
-        Only slabs of 20-node hexahedra have any. Linear tetrahedra are there to share the faults
-        of PyBullet's, and for anatomies no finer model is at hand.
+        Linear tetrahedra have none: they are there to share the faults of PyBullet's. Nor have
+        anatomies, for which no finer model is at hand.
         """
         tissue, mesh, count = self._tissue, self._mesh, len(centers_xy_m)
-        if count == 0 or not isinstance(mesh, SlabMesh) or mesh.element != "hexahedron20":
+        if count == 0 or not isinstance(mesh, SlabMesh) or mesh.element == "tetrahedron4":
             return Dent.none(ROWS * count)
         size = (tissue.length_x_m, tissue.width_y_m, tissue.thickness_m)
-        # By symmetry a disc is as good as its mirror image at small x and y.
-        places = np.unique(np.round(-np.abs(centers_xy_m), 9), axis=0, return_inverse=True)
+        # On hexahedra a disc is as good as its mirror image at small x and y; cells cut into
+        # tetrahedra have no mirror images.
+        mirrored = mesh.element == "hexahedron20"
+        distinct = -np.abs(centers_xy_m) if mirrored else centers_xy_m
+        places = np.unique(np.round(distinct, 9), axis=0, return_inverse=True)
         give = np.array(
             [
-                _missing_give(size, mesh.cells_xyz, tissue.poisson_ratio, x, y, radius_m, upper)
+                _missing_give(
+                    size, mesh.element, mesh.cells_xyz, tissue.poisson_ratio, x, y, radius_m, upper
+                )
                 for x, y in places[0].tolist()
             ]
         )[places[1]]
@@ -90,6 +95,7 @@ Size = tuple[float, float, float]
 @lru_cache(maxsize=4096)
 def _missing_give(
     size_m: Size,
+    element: ElementName,
     cells_xyz: tuple[int, int, int],
     poisson_ratio: float,
     x_m: float,
@@ -99,7 +105,7 @@ def _missing_give(
 ) -> tuple[float, ...]:
     """Give [m/N] of the three rows of a disc that the mesh lacks, at a Young's modulus of 1 Pa."""
     tissue = Tissue(length_x_m=size_m[0], width_y_m=size_m[1], thickness_m=size_m[2])
-    shown = _shown_by(size_m, cells_xyz, poisson_ratio).give(
+    shown = _shown_by(size_m, element, cells_xyz, poisson_ratio).give(
         np.array([x_m, y_m]), radius_m, _face(tissue, upper)
     )
     window, seen = _WINDOW * size_m[2], _EDGE_SEEN * size_m[2]
@@ -135,11 +141,11 @@ def _real_give(
 
 @lru_cache(maxsize=16)
 def _shown_by(
-    size_m: Size, cells_xyz: tuple[int, int, int], poisson_ratio: float
+    size_m: Size, element: ElementName, cells_xyz: tuple[int, int, int], poisson_ratio: float
 ) -> _FoundedTissue:
     """The whole slab on the model's own mesh."""
     tissue = Tissue(length_x_m=size_m[0], width_y_m=size_m[1], thickness_m=size_m[2])
-    return _FoundedTissue(slab_mesh(tissue, "hexahedron20", cells_xyz), size_m[2], poisson_ratio)
+    return _FoundedTissue(slab_mesh(tissue, element, cells_xyz), size_m[2], poisson_ratio)
 
 
 def _face(tissue: Tissue, upper: bool) -> FlatFace:
@@ -172,7 +178,10 @@ class _Foundation(BoundaryTerm):
     name = "foundation"
 
     def __init__(self, mesh: Mesh, stiffness: float) -> None:
-        points = MaterialPoints.of(mesh, gauss_hexahedron(3))
+        # On tetrahedra the model's own rule is too coarse for a mass matrix by itself; with the
+        # tissue's stiffness added it does.
+        rule = gauss_hexahedron(3) if mesh.element == "hexahedron20" else mesh.quadrature
+        points = MaterialPoints.of(mesh, rule)
         self._rest_m = mesh.nodes_m
         self.pairs = points.pairs
         mass = np.einsum("eq,qa,qb->eab", points.volumes_m3, points.values, points.values)
