@@ -60,11 +60,18 @@ def _draw(tree: str, outline: Outline, picture: Path) -> None:
 
 @app.command("check")
 def check(tree: Tree) -> None:
-    """Check a tree file: every fault with its place. Example: defras tree check mine.yaml"""
+    """Check a tree file: every fault with its place. Example: defras tree check mine.yaml
+
+    It checks that the file is well-formed and that guards stand before every motion. `defras tree
+    prove` proves that they stop it, and `defras run` runs no tree for which that fails.
+    """
     file = find(tree, "trees")
     spec = read_tree(file)
     count = sum(1 for _ in spec.root.walk())
-    typer.echo(f"{file}: {spec.name} is valid, {count} nodes; every motion stands under a guard")
+    typer.echo(
+        f"{file}: {spec.name} is well-formed, {count} nodes, and guards stand before every motion; "
+        f"whether they stop it in time was not looked at: see `defras tree prove {tree}`"
+    )
 
 
 @app.command("prove")

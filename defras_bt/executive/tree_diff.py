@@ -62,7 +62,15 @@ def tree_diff(old: TreeSpec, new: TreeSpec) -> list[Change]:
 
 def _header(old: TreeSpec, new: TreeSpec) -> Iterator[Change]:
     if old.metric != new.metric:
-        yield Change("file", new.name, f"listens to the metric {new.metric}, not {old.metric}")
+        yield Change("file", new.name, _listens(new.metric, old.metric))
+
+
+def _listens(now: str | None, was: str | None) -> str:
+    if was is None:
+        return f"listens to the metric {now} now; it listened to none before"
+    if now is None:
+        return f"listens to no metric any more; it listened to {was}"
+    return f"listens to the metric {now}, not {was}"
 
 
 def _of_pairs(found: Matching) -> Iterator[Change]:
@@ -77,12 +85,21 @@ def _of_pairs(found: Matching) -> Iterator[Change]:
         before, after = old.options.model_dump(), new.options.model_dump()
         for name, value in after.items():
             if before[name] != value:
-                yield Change("parameter", new_path, f"{name} is {value!r}, not {before[name]!r}")
+                yield Change("parameter", new_path, f"{name} {_became(value, before[name])}")
         was, now = ports_said(old), ports_said(new)
         for port in sorted({*was, *now}):
             said = [ports.get(port, f"the key {port}") for ports in (now, was)]
             if said[0] != said[1]:
                 yield Change("parameter", new_path, f"port {port} is {said[0]}, not {said[1]}")
+
+
+def _became(now: object, was: object) -> str:
+    """What became of a parameter; None is one of which the file says nothing."""
+    if was is None:
+        return f"is {now!r}; it was not given before"
+    if now is None:
+        return f"is not given any more; it was {was!r}"
+    return f"is {now!r}, not {was!r}"
 
 
 def _article(spec: NodeSpec) -> str:

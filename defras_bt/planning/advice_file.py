@@ -10,6 +10,7 @@ from ruamel.yaml import YAML
 
 from defras_sim.advice import Advice
 from defras_sim.scene import Scene, load_scene
+from defras_sim.yaml_source import InvalidFile, read_yaml
 
 
 def rule_name(kind: str, text: str) -> str:
@@ -23,7 +24,8 @@ def add_advice(file: Path, advice: Advice) -> Scene:
     The file is left as it was if the scene would not be valid with the rule.
 
     Raises:
-        InvalidFile: the scene is not valid with it, or was not before.
+        InvalidFile: the scene is not valid with it, or was not before. What the rule is to blame
+            for is told at the place of ``advice`` in ``file``, or at its first line.
         OSError: the file cannot be written.
     """
     before = file.read_text(encoding="utf-8")
@@ -39,8 +41,21 @@ def add_advice(file: Path, advice: Advice) -> Scene:
     trial = file.with_name(f".{file.name}.new")
     trial.write_text(text.getvalue(), encoding="utf-8")
     try:
-        scene = load_scene(trial)
+        scene = _with_rule(trial, file, advice)
         trial.replace(file)
     finally:
         trial.unlink(missing_ok=True)
     return scene
+
+
+def _with_rule(trial: Path, file: Path, advice: Advice) -> Scene:
+    """The scene in ``trial``; its faults are told of ``file``, in which the rule is not yet."""
+    try:
+        return load_scene(trial)
+    except InvalidFile as error:
+        faults = [fault.message for fault in error.faults]
+        source = read_yaml(file)
+        raise InvalidFile(
+            source.fault(("advice",), f"cannot take the rule '{advice.name}': {message}")
+            for message in faults
+        ) from error

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import pytest
 
+from defras_bt.executive.node import NodeParameters
 from defras_bt.executive.tree_diff import tree_diff
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.executive.tree_spec import TreeSpec
@@ -68,6 +69,7 @@ def test_layout_and_files_mean_nothing(changes, write_tree):
         ),
         ("name: operate", "name: work", ["= toy/work: was called operate"]),
         ("metric: local", "metric: median", ["~ toy: listens to the metric median, not local"]),
+        ("metric: local\n", "", ["~ toy: listens to no metric any more; it listened to local"]),
         (
             "children: [Think, Mend]",
             "children: [Mend, Think]",
@@ -96,6 +98,34 @@ def test_layout_and_files_mean_nothing(changes, write_tree):
 )
 def test_changes_in_words(changes, before, after, expected):
     assert changes((before, after)) == expected
+
+
+def test_a_metric_where_none_was(changes):
+    given = TREE.replace("metric: local\n", "")
+    with_metric = ("name: toy\n", "name: toy\nmetric: local\n")
+    assert changes(with_metric, text=given) == [
+        "~ toy: listens to the metric local now; it listened to none before"
+    ]
+
+
+def test_a_parameter_that_is_not_given_is_called_so(changes, toys):
+    class EaseParameters(NodeParameters):
+        after_s: float | None = None
+
+    class Ease(toys.Watch):
+        """Eases off, after a while if one is given."""
+
+        Parameters = EaseParameters
+
+    toys.registry.register(Ease)
+    without = TREE.replace("- Watch", "- Ease: {name: ease}")
+    given = TREE.replace("- Watch", "- Ease: {name: ease, after_s: 3.0}")
+    assert changes(("name: ease", "name: ease, after_s: 3.0"), text=without) == [
+        "~ toy/operate/ease: after_s is 3.0; it was not given before"
+    ]
+    assert changes((", after_s: 3.0", ""), text=given) == [
+        "~ toy/operate/ease: after_s is not given any more; it was 3.0"
+    ]
 
 
 def test_another_kind_of_composite_says_what_that_means(changes):

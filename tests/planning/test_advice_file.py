@@ -54,6 +54,21 @@ def test_a_rule_that_does_not_fit_leaves_the_file_alone(file, rule, message):
     assert file.read_text() == before
 
 
+def test_the_place_of_a_fault_stands_in_the_file_as_it_is(file):
+    """The user never sees the trial with the rule in it, and can look up every place told."""
+    far = Advice(name="far", reason="x", prefer="point (9,9)")
+    with pytest.raises(InvalidFile) as caught:
+        add_advice(file, far)
+    (fault,) = caught.value.faults
+    assert (fault.file, fault.line, fault.column) == (file, 1, 1)
+    assert fault.message.startswith("cannot take the rule 'far': ")
+    add_advice(file, VEIN)
+    with pytest.raises(InvalidFile) as caught:
+        add_advice(file, far)
+    (fault,) = caught.value.faults
+    assert file.read_text().splitlines()[fault.line - 1] == "advice:"
+
+
 def test_a_layer_keeps_the_rules_of_its_base(file):
     add_advice(file, VEIN)
     layer = file.with_name("layer.yaml")
