@@ -25,6 +25,7 @@ from defras_bt.benchmark.tissue_motions import (
     OFF_CENTRE_LIFT,
     Motion,
 )
+from defras_bt.benchmark.tissue_paths import PathResult, summary
 from defras_bt.benchmark.tissue_reference import MATERIALS, reference
 from defras_sim.geometry import Floats
 from defras_sim.scene import MaterialName
@@ -32,6 +33,8 @@ from defras_sim.scene import MaterialName
 STEP_M = 0.001
 # A force is right if it is off by at most this share, or by this much.
 FORCE_SHARE, FORCE_N = 0.05, 0.005
+# So many steps of random paths must end in equilibrium.
+CONVERGED_PERCENT = 99.5
 # Errors of small forces say little in per cent; these are left out of that number.
 _TELLING_N = 0.02
 OWN, FELUPE, BULLET, MUJOCO = "defras", "felupe", "PyBullet", "MuJoCo flex"
@@ -235,8 +238,8 @@ def growth(
     return Growth(kind, cells_xyz, model.unknowns, float(np.median(frames[2:])))
 
 
-def targets(cases: Sequence[Case]) -> list[dict[str, object]]:
-    """What the model is meant to reach, and what it reached."""
+def targets(cases: Sequence[Case], ends: Sequence[PathResult]) -> list[dict[str, object]]:
+    """What the model is meant to reach, and what it reached; ``ends`` are those of random paths."""
     own = [case for case in cases if case.kind == OWN]
     frames = np.concatenate([case.frames_s for case in own])
     lines = [
@@ -265,6 +268,10 @@ def targets(cases: Sequence[Case]) -> list[dict[str, object]]:
                 below=False,
             )
         )
+    if ends:
+        paths = summary(ends)
+        name = f"steps that converged on {paths.paths} random paths, %"
+        lines.append(_target(name, 100.0 * paths.converged, CONVERGED_PERCENT, below=False))
     return lines
 
 

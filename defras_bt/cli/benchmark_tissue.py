@@ -16,13 +16,20 @@ from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
 
 _PATHS, _PATHS_QUICK = 200, 8
+# For so many paths it is required that nearly every step converges.
+_PATHS_REQUIRED = 2000
 
 
 def tissue(
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/benchmark"),
     quick: Annotated[bool, typer.Option("--quick", help="One motion only: a minute.")] = False,
     paths: Annotated[
-        int | None, typer.Option(min=0, help=f"Random paths of the tool; {_PATHS} if not said.")
+        int | None,
+        typer.Option(
+            min=0,
+            help=f"Random paths of the tool; {_PATHS} if not said. "
+            f"The full requirement is --paths {_PATHS_REQUIRED}.",
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the random paths.")] = 0,
     jobs: Annotated[int, typer.Option(min=1, help="Random paths side by side.")] = 2,
@@ -53,7 +60,7 @@ def tissue(
     def write() -> None:
         """An interrupted run leaves what it has measured."""
         tables = {
-            "Targets": targets(cases),
+            "Targets": targets(cases, ends),
             "Random paths": [asdict(summary(ends))],
             "Growth with the mesh": [size.row() for size in sizes],
             "Every model and motion": [case.row() for case in cases],
@@ -85,7 +92,7 @@ def tissue(
             run_paths(count, seed, jobs, told=told)
             write()
     table = Table("", "measured", "target", "met")
-    for line in targets(cases):
+    for line in targets(cases, ends):
         table.add_row(*(_said(value) for value in line.values()))
     Console().print(table)
     paths_said = summary(ends)
@@ -97,4 +104,4 @@ def tissue(
 
 
 def _said(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

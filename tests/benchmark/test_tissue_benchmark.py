@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from defras_bt.benchmark import tissue
 from defras_bt.benchmark.tissue_models import BulletSlab, FelupeTissue, MujocoSlab, OwnTissue
 from defras_bt.benchmark.tissue_motions import CENTRE_LIFT, MOTIONS, OFF_CENTRE_LIFT
+from defras_bt.benchmark.tissue_paths import PathResult
 from defras_bt.benchmark.tissue_plot import tissue_figure
 from defras_bt.cli import benchmark_tissue
 from defras_bt.cli.benchmark import app
@@ -68,10 +69,42 @@ class _Double:
 
 def test_targets_compare_computing_on_the_same_motions(case):
     slow = replace(case, kind=tissue.FELUPE, computing_s=20 * case.computing_s)
-    lines = {line[""]: line for line in tissue.targets([case, slow])}
+    lines = {line[""]: line for line in tissue.targets([case, slow], [])}
     ratio = lines["times faster than felupe, same mesh"]
     assert ratio["measured"] == pytest.approx(20.0)
     assert ratio["met"] == "yes"
+
+
+def _path(stale: int) -> PathResult:
+    """A path of 200 steps, of which so many did not converge."""
+    return PathResult(
+        path=0,
+        material="neo_hookean",
+        attached=12,
+        steps=200,
+        stale=stale,
+        untrue=0,
+        iterations=400,
+        slowest_s=0.01,
+        force_n=0.1,
+        error=None,
+    )
+
+
+@pytest.mark.parametrize(("stale", "met"), [(2, "yes"), (3, "no")])
+def test_random_paths_have_a_target_of_their_own(case, stale, met):
+    """Of 400 steps two may fail: that is 99.5 %."""
+    line = tissue.targets([case], [_path(0), _path(stale)])[-1]
+    assert line[""] == "steps that converged on 2 random paths, %"
+    assert line["measured"] == pytest.approx(100.0 * (400 - stale) / 400)
+    assert (line["target"], line["met"]) == ("at least 99.5", met)
+    names = [line[""] for line in tissue.targets([case], [])]
+    assert not [name for name in names if "random paths" in name], "none were measured"
+
+
+def test_help_names_the_full_requirement():
+    said = CliRunner().invoke(app, ["tissue", "--help"], env={"COLUMNS": "200"}).output
+    assert "--paths 2000" in said
 
 
 @pytest.mark.parametrize("model", [FelupeTissue, BulletSlab, MujocoSlab])
