@@ -145,6 +145,7 @@ class Executive:
         self._tell_stopped(verdict)
         sent = verdict.command if board.outcome is None else HOLD
         self._world.command(sent)
+        self._perception.sent(inputs.time_s, sent)
         self._record(inputs, sent)
         self._splice()
         self._tick += 1

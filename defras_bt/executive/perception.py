@@ -18,7 +18,7 @@ from defras_bt.sensing.latest import LatestReadings
 from defras_bt.sensing.sense import SensedObservation, sense
 from defras_sim.tissue.state import TissueState
 from defras_sim.twin import Twin
-from defras_sim.worlds.protocol import Observation
+from defras_sim.worlds.protocol import Command, Observation
 
 
 class Perception:
@@ -90,6 +90,10 @@ class Perception:
             operator=operator,
             force_over_s=board.force_over_s,
         )
+
+    def sent(self, time_s: float, command: Command) -> None:
+        """``command`` went to the arms at the tick of ``time_s``: they have to follow it."""
+        self._arms.sent(time_s, command)
 
     def _standstill(self, time_s: float) -> Mapping[str, str]:
         """A clock that does not move on makes every old reading look fresh."""

@@ -9,8 +9,15 @@ import numpy as np
 
 from defras_bt.faults.fault import Fault, Injector
 from defras_bt.sensing.arms import FOLLOWING_M, JUMP_M
+from defras_bt.sensing.dead_reckoning import ALLOWED_SHARE, STRAYED_M, shortened
 from defras_sim.scene import ArmName, Scene, Vector
-from defras_sim.worlds.protocol import JAW_OPEN_RAD, ArmCommand, Command, Observation
+from defras_sim.worlds.protocol import (
+    JAW_OPEN_RAD,
+    ArmCommand,
+    ArmObservation,
+    Command,
+    Observation,
+)
 
 _SPRUNG_S = 0.5
 """So long a jaw that lost the tissue stays open by force."""
@@ -132,11 +139,70 @@ class CommandsLost(ArmFault):
         return _CommandsLost(self, scene, rng)
 
 
-class _CommandsLost(ArmInjector):
+class _Unheard(ArmInjector):
+    """Base: sums up motion that was commanded and is not seen, less what may go differently."""
+
+    def __init__(self, fault: ArmFault, scene: Scene, rng: np.random.Generator) -> None:
+        super().__init__(fault, scene, rng)
+        self._unseen_m = np.zeros(3)
+
+    def told(self, wanted: ArmCommand, *, seen: bool) -> None:
+        """The arm is told ``wanted``; ``seen``: its readings will show it."""
+        step_m = wanted.linear_m_s * self._scene.tick_s
+        more_m = self._unseen_m if seen else self._unseen_m + step_m
+        self._unseen_m = shortened(more_m, ALLOWED_SHARE * float(np.linalg.norm(step_m)))
+
+    def judge(self) -> None:
+        # What rounding decides is nobody's fault.
+        strayed = np.linalg.norm(self._unseen_m) > STRAYED_M + 1e-9
+        self.trip = f"{self._arm} does not go where it is told" if strayed else ""
+
+
+class _CommandsLost(_Unheard):
+    def observed(self, true: Observation, delivered: Observation) -> Observation:
+        self.judge()
+        return delivered
+
     def commanded(self, command: Command, true: Observation) -> Command:
-        if self._arm not in command.arms or not self.happens(true.time_s):
+        wanted = command.arms.get(self._arm)
+        if wanted is None:
+            return command
+        lost = self.happens(true.time_s)
+        self.told(wanted, seen=not lost)
+        if not lost:
             return command
         return Command({name: arm for name, arm in command.arms.items() if name != self._arm})
+
+
+class Republished(ArmFault):
+    """An arm's driver sends its last reading again and again as if it were new."""
+
+    kind: ClassVar[str] = "republished"
+
+    def injector(self, scene: Scene, rng: np.random.Generator) -> Injector:
+        return _Republished(self, scene, rng)
+
+
+class _Republished(_Unheard):
+    def __init__(self, fault: ArmFault, scene: Scene, rng: np.random.Generator) -> None:
+        super().__init__(fault, scene, rng)
+        self._kept: ArmObservation | None = None
+
+    def observed(self, true: Observation, delivered: Observation) -> Observation:
+        arm = delivered.arms.get(self._arm)
+        if arm is None or not self._fault.active(true.time_s):
+            self._kept, self._unseen_m, self.trip = None, np.zeros(3), ""
+            return delivered
+        self._kept = self._kept or arm
+        self.judge()
+        again = replace(self._kept, stamp_s=arm.stamp_s)
+        return replace(delivered, arms={**delivered.arms, self._arm: again})
+
+    def commanded(self, command: Command, true: Observation) -> Command:
+        wanted = command.arms.get(self._arm)
+        if wanted is not None and self._kept is not None:
+            self.told(wanted, seen=False)
+        return command
 
 
 class GraspLost(ArmFault):

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defras_bt.faults.arms import CommandsLost, GraspLost, JawStuck, Jumped, NotFollowing
+from defras_bt.faults.arms import (
+    CommandsLost,
+    GraspLost,
+    JawStuck,
+    Jumped,
+    NotFollowing,
+    Republished,
+)
 from defras_bt.faults.clouds import Displaced, Noisy, Repeated, Sparse, WrongFrame, WrongUnit
 from defras_bt.faults.fault import Fault
 from defras_bt.faults.readings import (
@@ -58,6 +65,7 @@ _KINDS: tuple[type[Fault], ...] = (
     Jumped,
     JawStuck,
     CommandsLost,
+    Republished,
     GraspLost,
     ClockStopped,
     WorldLost,

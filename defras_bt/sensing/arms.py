@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 
 import numpy as np
 
+from defras_bt.sensing.dead_reckoning import STRAYED_M, DeadReckoning
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
-from defras_sim.worlds.protocol import ArmObservation, Observation
+from defras_sim.worlds.protocol import ArmObservation, Command, Observation
 
 FOLLOWING_M = 0.003
 """Farther than this from its set-point, a tip does not follow: three times a dVRK's usual error,
@@ -22,7 +24,9 @@ class ArmPlausibility:
 
     A tip that left its set-point (a blocked or switched-off arm) is unsound as long as it is away.
     A tip or set-point that jumped (a slipped encoder, another frame) is unsound until it is back
-    where it was lost: where it really is, nobody knows. After the operator drove the arms
+    where it was lost: where it really is, nobody knows. A set-point that does not go where the
+    commands lead is unsound until it is there: either the arm does not hear, or its driver repeats
+    an old message as if it were new while the arm moves on. After the operator drove the arms
     themselves, where they stand is believed anew.
     """
 
@@ -30,6 +34,13 @@ class ArmPlausibility:
         self._speed_m_s = scene.motion.reach_speed_m_s
         self._last: dict[str, ArmObservation] = {}
         self._lost: dict[str, ArmObservation] = {}
+        self._tick_s = scene.tick_s
+        self._reckoned: defaultdict[str, DeadReckoning] = defaultdict(DeadReckoning)
+
+    def sent(self, time_s: float, command: Command) -> None:
+        """``command`` was sent for the tick that begins at ``time_s``; call it once per tick."""
+        for name, arm in command.arms.items():
+            self._reckoned[name].sent(time_s, arm.linear_m_s, self._tick_s)
 
     def faults(self, observation: Observation, *, driven_by_hand: bool) -> Mapping[str, str]:
         """A sentence for each arm that must not be acted on; call it once per tick."""
@@ -44,6 +55,14 @@ class ArmPlausibility:
             away_m = _distance_m(
                 arm.tissue_from_tip.position_m, arm.setpoint_tissue_from_tip.position_m
             )
+            if driven_by_hand or away_m > FOLLOWING_M:
+                # A driver may take the set-point back to a tip that was held up.
+                self._reckoned[name].forget()
+                strayed_m = 0.0
+            else:
+                strayed_m = self._reckoned[name].strayed_m(
+                    arm.stamp_s, arm.setpoint_tissue_from_tip
+                )
             if away_m > FOLLOWING_M:
                 found[name] = (
                     f"{name} does not follow: its tip is {away_m * 1e3:.1f} mm away from where it "
@@ -53,6 +72,11 @@ class ArmPlausibility:
                 found[name] = (
                     f"{name} is {jumped_m * 1e3:.1f} mm away from where it can be: its position "
                     "jumped and is not believed until it is back"
+                )
+            elif strayed_m > STRAYED_M:
+                found[name] = (
+                    f"{name} does not follow: its set-point is {strayed_m * 1e3:.1f} mm away from "
+                    f"where the commands lead, at most {STRAYED_M * 1e3:g} mm are allowed"
                 )
         return found
 

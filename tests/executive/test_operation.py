@@ -5,16 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from defras_bt.executive.executive import ExecutiveFailed
 from defras_bt.executive.operation import Operation, operate
+from defras_bt.faults.arms import ArmFault, CommandsLost, Republished
+from defras_bt.faults.faults import FaultInjection, Faults
 from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.bag_reader import read_bag
 from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
 from defras_bt.recording.summary import SummaryRecorder, read_run_json
 from defras_bt.recording.timeline import TimelineRecorder
 from defras_bt.recording.timeline_digest import timeline_digest
+from defras_bt.sensing.dead_reckoning import STRAYED_M
 from defras_sim.resources import resource
 from defras_sim.scene import Attachments, Roi, Scene, Simulation, Tissue
 from defras_sim.worlds.error import WorldError
@@ -102,6 +106,21 @@ def test_hidden_attachments_are_noticed() -> None:
     assert summary.values["attachment_updates"]["tried"] >= 1
 
 
+@pytest.mark.parametrize("kind", [Republished, CommandsLost])
+def test_an_arm_that_does_not_show_what_it_was_told_is_commanded_no_farther(
+    kind: type[ArmFault],
+) -> None:
+    kept, start_s = KeepEvents(), 0.5
+    faults = Faults((kind(arm="psm1", start_s=start_s),))
+    plan = operation(scene(), max_time_s=20.0)
+    summary = operate(plan, [kept], faults=FaultInjection(faults, scene(), seed=0))
+    assert summary.values["outcome"] == "human"
+    tick_s = scene().tick_s
+    unseen_m = sum(kept.sent_speed_m_s[round(start_s / tick_s) :]) * tick_s
+    assert np.sqrt(3) * unseen_m > STRAYED_M
+    assert unseen_m < 2 * STRAYED_M
+
+
 def test_what_was_recorded_before_a_failure_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -126,3 +145,39 @@ def test_what_was_recorded_before_a_failure_is_kept(
     assert read_run_json(tmp_path / "run.json").outcome == "error"
     assert timeline_digest(tmp_path / "run.rrd")
     assert len(read_bag(tmp_path / "recording.mcap")["/PSM1/measured_cp"].time_s) > 10
+
+
+class Finished(KeepEvents):
+    """Keeps what it was finished with."""
+
+    def __init__(self, stops_at_start: bool = False) -> None:
+        super().__init__()
+        self.stops_at_start = stops_at_start
+        self.outcomes: list[object] = []
+
+    def start(self, info: RunInfo) -> None:
+        if self.stops_at_start:
+            raise KeyboardInterrupt
+
+    def finish(self, summary: RunSummary) -> None:
+        self.outcomes.append(summary.values["outcome"])
+
+
+def test_recorders_are_finished_where_a_run_cannot_be_summed_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def summary(*_: object) -> RunSummary:
+        raise ArithmeticError("no sum")
+
+    monkeypatch.setattr(SummaryRecorder, "summary", summary)
+    kept = Finished()
+    with pytest.raises(ArithmeticError, match="no sum"):
+        operate(operation(scene(), max_time_s=0.2), [kept])
+    assert kept.outcomes == ["not_reached"]
+
+
+def test_recorders_are_finished_where_the_start_was_interrupted() -> None:
+    kept = Finished(stops_at_start=True)
+    with pytest.raises(KeyboardInterrupt):
+        operate(operation(scene(), max_time_s=0.2), [kept])
+    assert kept.outcomes == ["error"]

@@ -181,7 +181,9 @@ class TestUnlikelyReadings:
         world = senses.bench.world
         old = world.observe()
         for _ in range(3):
-            world.command(Command({"psm1": ArmCommand(np.array([0.0, 0.0, 0.05]))}))
+            command = Command({"psm1": ArmCommand(np.array([0.0, 0.0, 0.05]))})
+            senses.perception.sent(world.time_s, command)
+            world.command(command)
             seen = senses.look()
         late = senses.perception.update(world.ticks, replace(world.observe(), arms=old.arms))
         assert late.missing == ()

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from defras_bt.executive.testing import bench_scene, flat_cloud_m
-from defras_bt.faults.arms import CommandsLost, GraspLost, JawStuck, Jumped, NotFollowing
+from defras_bt.faults.arms import (
+    CommandsLost,
+    GraspLost,
+    JawStuck,
+    Jumped,
+    NotFollowing,
+    Republished,
+)
 from defras_bt.faults.clouds import Displaced, Noisy, Repeated, Sparse, WrongFrame, WrongUnit
 from defras_bt.faults.readings import (
     Delayed,
@@ -182,8 +189,19 @@ class TestArms:
         assert last.tissue_from_tip.position_m[2] == pytest.approx(0.06 + 0.05)
 
     def test_commands_that_are_lost_move_nothing(self) -> None:
-        seen = watch(faulty(CommandsLost(arm="psm1")), 1.0, UP)
+        world = faulty(CommandsLost(arm="psm1"))
+        seen = watch(world, 1.0, UP)
         assert len({tuple(o.arms["psm1"].tissue_from_tip.position_m) for o in seen}) == 1
+        assert tripped(world)[0] == pytest.approx(0.1), "4.5 mm of 5 mm count as unexplained"
+
+    def test_a_reading_that_is_republished_stays_with_new_stamps(self) -> None:
+        world = faulty(Republished(arm="psm1", **ONE_SECOND))
+        seen = watch(world, 3.0, UP)
+        heights = [o.arms["psm1"].tissue_from_tip.position_m[2] for o in seen]
+        assert len(set(heights[20:40])) == 1
+        assert heights[40] == pytest.approx(heights[20] + 0.05)
+        assert all(o.arms["psm1"].stamp_s == o.time_s for o in seen)
+        np.testing.assert_allclose(tripped(world), np.arange(1.1, 1.999, 0.05))
 
     def test_tissue_slips_once(self) -> None:
         world = faulty(GraspLost(start_s=0.5))

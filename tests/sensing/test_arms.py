@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from defras_bt.sensing.arms import FOLLOWING_M, JUMP_M, ArmPlausibility
+from defras_bt.sensing.dead_reckoning import STRAYED_M
 from defras_sim.geometry import Pose
 from defras_sim.scene import Attachments, Roi, Scene
-from defras_sim.worlds.protocol import ArmObservation, Observation
+from defras_sim.worlds.protocol import ArmCommand, ArmObservation, Command, Observation
 
 SCENE = Scene(
     name="s", attachments=Attachments(map=("#" * 12,) * 12), roi=Roi(center_x_m=0, center_y_m=0)
@@ -31,12 +32,19 @@ def faults(
     return check.faults(Observation(time_s, {"psm1": arm}), driven_by_hand=by_hand).get("psm1", "")
 
 
+def go(check: ArmPlausibility, time_s: float, speed_m_s: float = SPEED_M_S) -> None:
+    """The arm is told to go along x for a tick."""
+    check.sent(time_s, Command({"psm1": ArmCommand(np.array([speed_m_s, 0.0, 0.0]))}))
+
+
 @pytest.fixture
 def check() -> ArmPlausibility:
     return ArmPlausibility(SCENE)
 
 
 def test_full_speed_is_believed_also_over_a_gap_in_the_messages(check) -> None:
+    for tick in range(12):
+        go(check, 0.05 * tick)
     for time_s in (0.0, 0.05, 0.1, 0.5, 0.55):
         assert faults(check, time_s, SPEED_M_S * time_s) == ""
 
@@ -66,3 +74,35 @@ def test_what_is_no_number_is_left_to_freshness_and_is_no_place_to_jump_from(che
     faults(check, 0.0, 0.0)
     assert faults(check, 0.05, float("nan")) == ""
     assert faults(check, 0.1, 0.0) == ""
+
+
+@pytest.mark.parametrize("speed_m_s", [SPEED_M_S, 0.015, 0.001])
+def test_an_arm_that_stays_does_not_follow_however_slowly_it_was_told_to_go(
+    check, speed_m_s
+) -> None:
+    told_m, time_s = 0.0, 0.0
+    while not faults(check, time_s, 0.0):
+        go(check, time_s, speed_m_s)
+        told_m, time_s = told_m + 0.05 * speed_m_s, time_s + 0.05
+        assert told_m < 2 * STRAYED_M
+    assert told_m > STRAYED_M
+    assert "psm1 does not follow: its set-point is" in faults(check, time_s + 5.0, 0.0)
+
+
+def test_it_is_believed_again_where_the_commands_led(check) -> None:
+    """The driver that repeated itself delivers again: the arm has moved all along."""
+    for tick in range(4):
+        faults(check, 0.05 * tick, 0.0)
+        go(check, 0.05 * tick)
+    assert faults(check, 0.2, 0.0)
+    assert faults(check, 0.25, 0.2 * SPEED_M_S) != "", "the way there looks like a jump"
+    assert faults(check, 0.3, 0.0)
+
+
+def test_what_did_not_hear_is_believed_after_it_was_driven_by_hand(check) -> None:
+    for tick in range(4):
+        faults(check, 0.05 * tick, 0.0)
+        go(check, 0.05 * tick)
+    assert faults(check, 0.2, 0.0)
+    assert faults(check, 0.25, 0.0, by_hand=True) == ""
+    assert faults(check, 0.3, 0.0) == ""

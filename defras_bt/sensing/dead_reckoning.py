@@ -1,0 +1,100 @@
+"""Where an arm's set-point must have come to, from what was commanded."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from defras_sim.geometry import Floats, Pose
+
+STRAYED_M = 0.004
+"""Farther than this from where the commands lead, a set-point did not advance as commanded: more
+than one and a half ticks at full speed, so that a command that takes effect a tick late is none."""
+ALLOWED_SHARE = 0.1
+"""This share of the way an arm may go differently, for good: the time for which a real arm carries
+out a command is not exact. A share of the way, not of time, so that however slowly an arm is told
+to go, it is found out after the same few millimetres."""
+# Readings older than this are refused as stale long before.
+_KEPT_S = 10.0
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """One command's motion from ``start_s`` on; ``before_m`` (3,), ``way_before_m``: the sum up to
+    there, ``step_m`` (3,): its own part, evenly over ``tick_s``."""
+
+    start_s: float
+    tick_s: float
+    before_m: Floats
+    way_before_m: float
+    step_m: Floats
+
+    def at(self, time_s: float) -> tuple[Floats, float]:
+        """Displacement (3,) and length of the way, both in metres, up to ``time_s``."""
+        share = float(np.clip((time_s - self.start_s) / self.tick_s, 0.0, 1.0))
+        way_m = share * float(np.linalg.norm(self.step_m))
+        return self.before_m + share * self.step_m, self.way_before_m + way_m
+
+
+class DeadReckoning:
+    """Follows one arm's set-point by what was sent, and tells how far a reading is from there.
+
+    The first reading is believed. From then on only commands lead on; readings draw the reckoning
+    to themselves by ``ALLOWED_SHARE`` of the way and no more.
+    """
+
+    def __init__(self) -> None:
+        self._legs: deque[_Leg] = deque()
+        self._start_m: Floats | None = None
+        self._way_m = 0.0
+
+    def sent(self, time_s: float, linear_m_s: Floats, tick_s: float) -> None:
+        """The tip is told to go at ``linear_m_s`` (3,) from ``time_s`` on, for ``tick_s``."""
+        if not np.any(linear_m_s):
+            return
+        before_m, way_m, start_s = np.zeros(3), 0.0, time_s
+        if self._legs:
+            last = self._legs[-1]
+            start_s = max(time_s, last.start_s + last.tick_s)
+            before_m, way_m = last.at(start_s)
+        self._legs.append(_Leg(start_s, tick_s, before_m, way_m, linear_m_s * tick_s))
+        while self._legs[0].start_s < time_s - _KEPT_S:
+            self._legs.popleft()
+
+    def forget(self) -> None:
+        """Believe the next reading as if it were the first."""
+        self._start_m = None
+
+    def strayed_m(self, stamp_s: float, setpoint: Pose) -> float:
+        """How far ``setpoint`` (tissue_from_tip), read at ``stamp_s``, is from where commands led.
+
+        0 for the first reading.
+        """
+        sent_m, way_m = self._sent_until(stamp_s)
+        gone_m = setpoint.position_m - sent_m
+        if self._start_m is None:
+            self._start_m, self._way_m = gone_m, way_m
+            return 0.0
+        allowed_m = ALLOWED_SHARE * max(0.0, way_m - self._way_m)
+        self._way_m = max(way_m, self._way_m)
+        astray_m = shortened(gone_m - self._start_m, allowed_m)
+        self._start_m = gone_m - astray_m
+        return float(np.linalg.norm(astray_m))
+
+    def _sent_until(self, time_s: float) -> tuple[Floats, float]:
+        for leg in reversed(self._legs):
+            if leg.start_s <= time_s:
+                return leg.at(time_s)
+        return self._legs[0].at(time_s) if self._legs else (np.zeros(3), 0.0)
+
+
+def shortened(vector_m: Floats, by_m: float) -> Floats:
+    """``vector_m`` (3,) shorter by ``by_m``; zero where it was no longer than that.
+
+    >>> shortened(np.array([0.0, 0.0, 4.0]), 1.0)
+    array([0., 0., 3.])
+    """
+    length_m = float(np.linalg.norm(vector_m))
+    return vector_m * (1.0 - by_m / length_m) if length_m > by_m else np.zeros(3)
