@@ -79,7 +79,7 @@ def operate(
     deadline: Deadline = nullcontext,
     finishing: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> RunSummary:
-    """Run the operation to its outcome; every recorder is finished whatever happens.
+    """Run the operation to its outcome; recorders that were started are finished in any case.
 
     ``operator`` is asked every tick. ``faults`` go wrong on the way. ``deadline`` limits how long a
     tick may take on the wall. ``finishing`` surrounds the finishing of the recorders, which nobody
@@ -160,14 +160,20 @@ def operate_in(
         breaker = injected.breaker()
         if breaker is not None:
             executive.watch(breaker)
-        recorder.start(_info(operation, executive, believed, injected.faults))
+        info = _info(operation, executive, believed, injected.faults)
         try:
+            recorder.start(info)
             executive.run()
         finally:
             with finishing():
                 wall_s = perf_counter() - started
-                summary = summary_recorder.summary(board.outcome or "error", wall_s)
-                recorder.finish(summary)
+                outcome = board.outcome or "error"
+                summary = RunSummary({"outcome": outcome})
+                try:
+                    summary = summary_recorder.summary(outcome, wall_s)
+                finally:
+                    # Without its numbers too, what was recorded is closed properly.
+                    recorder.finish(summary)
     finally:
         world.close()
     return summary
