@@ -28,7 +28,8 @@ def at_the_desk(
         UserError: another run is under way in ``out``.
     """
     elsewhere = f"defras operator {out} approve" if out is not None else ""
-    terminal = _Terminal(desk, console, elsewhere)
+    by_keys = sys.stdin is not None and sys.stdin.isatty()
+    terminal = _Terminal(desk, console, elsewhere, piped=not by_keys)
     with ExitStack() as stack:
         if out is not None:
             try:
@@ -36,9 +37,9 @@ def at_the_desk(
             except ConnectionError as error:
                 raise UserError(str(error)) from error
         stack.callback(desk.listen(terminal.show))
-        if sys.stdin.isatty() or asks:
-            if sys.stdin.isatty():
-                console.print(f"Keys: {HELP}.", style="dim", markup=False)
+        if by_keys:
+            console.print(f"Keys: {HELP}.", style="dim", markup=False)
+        if by_keys or asks:
             stack.enter_context(listening(terminal.typed, terminal.ended))
         yield
 
@@ -46,13 +47,18 @@ def at_the_desk(
 class _Terminal:
     """Shows what waits for the operator, and passes on what is typed.
 
-    ``elsewhere`` says how else a plan can be answered; "" where it cannot.
+    ``elsewhere`` says how else a plan can be answered; "" where it cannot. Lines that are ``piped``
+    in may come before what they answer. A key may not: one that bounces would approve a plan that
+    nobody has read.
     """
 
-    def __init__(self, desk: OperatorDesk, console: Console, elsewhere: str) -> None:
+    def __init__(
+        self, desk: OperatorDesk, console: Console, elsewhere: str, *, piped: bool = False
+    ) -> None:
         self._desk = desk
         self._console = console
         self._elsewhere = elsewhere
+        self._piped = piped
         self._shown = 0
         self._early: list[Act] = []
         self._ended = False
@@ -70,11 +76,12 @@ class _Terminal:
             self._nobody_answers()
 
     def typed(self, text: str) -> None:
-        """A key or a line. Answers may be piped in before they are asked for."""
+        """A key or a line."""
         act = act_of(text)
+        early = act in (Act.APPROVE, Act.REFUSE) and not self._desk.notice().question
         if act is None:
             self._console.print(f"{text.strip()!r} is no key. Keys: {HELP}.", markup=False)
-        elif act in (Act.APPROVE, Act.REFUSE) and not self._desk.notice().question:
+        elif early and self._piped:
             self._early.append(act)
         else:
             self._answer(act)

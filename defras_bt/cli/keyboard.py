@@ -42,6 +42,11 @@ def listening(
     ``on_end`` is called where the input ends before. Both are called from another thread.
     """
     source = stream if stream is not None else sys.stdin
+    if source is None:
+        # A program that was started without a standard input, as by cron, has none.
+        on_end()
+        yield
+        return
     if not source.isatty():
         # A line may never come: the thread must not keep the program from ending.
         Thread(target=_lines, args=(source, on_typed, on_end), daemon=True).start()

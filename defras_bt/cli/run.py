@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -130,7 +133,7 @@ def run(
                 operator=desk,
                 faults=FaultInjection(injected, believed, seed),
                 deadline=interrupting(LONGEST_TICK_S),
-                finishing=interrupts.finishing,
+                finishing=partial(_ended, desk, interrupts),
             )
     except KeyboardInterrupt:
         console.print("Ended by the operator; the arms were stopped first.", style="bold red")
@@ -145,6 +148,14 @@ def run(
             f"Written to {out}: run.rrd, recording.mcap, decisions.jsonl, run.json, report.html"
         )
     raise typer.Exit(OUTCOME_CODES[str(summary.values["outcome"])])
+
+
+@contextmanager
+def _ended(desk: OperatorDesk, interrupts: Interrupts) -> Iterator[None]:
+    """While recordings are finished nobody can ask for anything, and nobody interrupts."""
+    with interrupts.finishing():
+        desk.close()
+        yield
 
 
 def code_without_record(outcome: str) -> ExitCode:

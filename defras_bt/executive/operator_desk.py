@@ -91,6 +91,7 @@ class OperatorDesk:
         self._question: _Question | None = None
         self._plan_number = 0
         self._listeners: list[Listener] = []
+        self._closed = False
 
     def request(
         self, act: Act, source: str, words: str = "", plan_number: int | None = None
@@ -122,6 +123,14 @@ class OperatorDesk:
             waiting = self._question if self._open_question() else None
             question = waiting.text if waiting is not None else ""
             return DeskNotice(self._mode, question, self._plan_number, self._possible(), sentence)
+
+    def close(self) -> None:
+        """The operation has its outcome: from now on nothing takes effect any more."""
+        with self._changed:
+            self._closed = True
+            self._question = None
+            self._changed.notify_all()
+        self._tell("The operation has ended.")
 
     def listen(self, listener: Listener) -> Callable[[], None]:
         """Tell ``listener`` of every change; the function returned ends that."""
@@ -171,6 +180,8 @@ class OperatorDesk:
         return self._question is not None and self._question.answer is None
 
     def _possible(self) -> tuple[Act, ...]:
+        if self._closed:
+            return ()
         answers = (Act.APPROVE, Act.REFUSE) if self._open_question() else ()
         return (*NEXT[self._mode], *answers)
 
@@ -184,7 +195,8 @@ class OperatorDesk:
                 )
             return None
         if not possible:
-            return f"{act.spoken} is not possible: the operation was stopped"
+            why = "has ended" if self._closed else "was stopped"
+            return f"{act.spoken} is not possible: the operation {why}"
         choice = ", ".join(other.spoken for other in possible)
         why = (
             "no plan waits for approval"

@@ -19,9 +19,11 @@ from defras_bt.cli.at_the_desk import at_the_desk
 from defras_bt.cli.interrupts import Interrupts
 from defras_bt.cli.keyboard import KEYS, act_of, listening
 from defras_bt.executive.operator_desk import OperatorDesk
-from defras_bt.executive.operator_socket import serve
+from defras_bt.executive.operator_socket import ask, serve
 from defras_bt.executive.testing import plan_of
 from defras_bt.recording.operator_state import Act, Mode
+from defras_bt.recording.record import RunSummary
+from defras_bt.recording.summary import SummaryRecorder
 from tests.cli.test_outside_world import quick_scene
 
 Defras = Callable[..., tuple[int, str, str]]
@@ -172,3 +174,51 @@ def test_a_run_that_is_paused_and_stopped_keeps_the_acts(
     assert [act["act"] for act in run["operator"]["acts"]] == ["pause", "resume", "stop"]
     assert "The operator paused the operation" in said
     assert "The operator paused the operation" in (out / "report.html").read_text()
+
+
+def test_a_key_that_bounces_approves_no_plan_that_nobody_has_read() -> None:
+    """The second key comes when no plan waits; the next plan is another one."""
+    ours, theirs = pty.openpty()
+    desk, said = OperatorDesk(asks=True), io.StringIO()
+    first, second = plan_of((2, 4)), plan_of((2, 5))
+    with os.fdopen(theirs, "r") as terminal, pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.stdin", terminal)
+        with at_the_desk(desk, Console(file=said), None, asks=True):
+            assert desk.approve(first) is None
+            os.write(ours, b"yy")
+            assert eventually(lambda: "no plan waits for approval" in said.getvalue())
+            desk.state()
+            assert desk.approve(first) is True
+            desk.state()
+            assert desk.approve(second) is None
+            assert desk.approve(second) is None
+            os.write(ours, b"y")
+            assert eventually(lambda: desk.approve(second) is True)
+    os.close(ours)
+
+
+@pytest.mark.parametrize("asks", [True, False])
+def test_without_any_input_a_plan_that_must_be_approved_is_refused(
+    monkeypatch: pytest.MonkeyPatch, asks: bool
+) -> None:
+    monkeypatch.setattr("sys.stdin", None)
+    desk = OperatorDesk(asks=asks)
+    with at_the_desk(desk, Console(quiet=True), None, asks=asks):
+        assert answers(desk) is not asks
+
+
+def test_while_recordings_are_finished_the_desk_is_closed(
+    defras: Defras, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replies: list[dict[str, object]] = []
+
+    def finish(self: SummaryRecorder, summary: RunSummary) -> None:
+        if not replies:
+            replies.append(ask(out, {"act": "pause"}))
+
+    monkeypatch.setattr(SummaryRecorder, "finish", finish)
+    scene, out = quick_scene(tmp_path, "quick"), tmp_path / "out"
+    defras("run", scene, "--tree", "fras", "--max-time", "1", "--out", str(out))
+    assert [(reply["ok"], reply["sentence"]) for reply in replies] == [
+        (False, "pause is not possible: the operation has ended")
+    ]

@@ -163,3 +163,17 @@ def test_many_threads_lose_no_act():
     assert len(told) == len(taken)
     alternating = [Act.PAUSE, Act.RESUME] * len(told)
     assert [done.act for done in told] == alternating[: len(told)]
+
+
+def test_after_the_outcome_nothing_is_possible_and_no_plan_waits():
+    desk, heard = OperatorDesk(asks=True), []
+    desk.approve(PLAN)
+    desk.listen(heard.append)
+    desk.close()
+    for act in Act:
+        answer = desk.request(act, "test")
+        assert not answer.accepted
+        assert answer.sentence.endswith("is not possible: the operation has ended")
+    assert (desk.notice().question, desk.notice().possible) == ("", ())
+    assert desk.state().acts == ()
+    assert [notice.sentence for notice in heard] == ["The operation has ended."]
