@@ -285,7 +285,21 @@ class Executive:
         """One more record, with what the broken tick told, so that nobody has to guess."""
         board = self._board
         last = self.last or self._known(board.inputs, HOLD)
-        untold = board.events if board.inputs.tick > last.tick else ()
+        untold: list[Event] = []
+        if board.inputs.tick > last.tick:
+            # The tick broke after it had sensed: this is what it knew.
+            known, untold = board.inputs, board.events
+            last = replace(
+                last,
+                time_s=known.time_s,
+                observation=known.observation,
+                twin=known.twin,
+                reading=known.reading,
+                force_n=known.force_n,
+                true_force_n=None,
+                true_surface=None,
+                operator=known.operator,
+            )
         event = Event(last.time_s, "error", "error", sentence)
         ended = board.outcome_cause
         self._recorder.tick(

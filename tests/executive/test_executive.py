@@ -105,6 +105,16 @@ class TestExceptions:
         assert [event.kind for event in stage.notes.records[-1].events] == ["hold", "error"]
         assert stage.notes.told("hold") == ["Something feels wrong."]
 
+    def test_the_last_record_has_the_inputs_of_the_tick_that_broke(self):
+        stage = at_pull()
+        broken_leaf(stage)
+        run(stage)
+        before, last = stage.notes.records[-2:]
+        assert last.time_s == stage.board.inputs.time_s > before.time_s
+        assert last.observation is stage.board.inputs.observation
+        assert last.events[-1].time_s == last.time_s
+        assert (last.true_force_n, last.true_surface) == (None, None)
+
     def test_ticks_and_times_of_the_records_go_on_to_the_end(self):
         stage = at_pull()
         broken_twin(stage)
