@@ -45,6 +45,9 @@ def explain(moment: Moment) -> Explanation:
     decided = _sentence(moment.cause)
     if moment.ended is not None:
         decided = f"The operation ended. {_sentence(moment.ended)}"
+    if moment.cause == moment.ended and not moment.cause.path:
+        # The executive itself broke: no node decided, and what they said is of the tick before.
+        return Explanation(when, decided)
     stopped = moment.stopped_by
     stop = ""
     if stopped is not None and stopped.message not in (moment.cause.message, decided):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from defras_bt.executive.executive import ExecutiveFailed
 from defras_bt.executive.reasons import Code
 from defras_bt.executive.testing import EPSILON_N
 from defras_bt.recording.explain import Explanation, explain, spoken
@@ -104,3 +105,13 @@ def test_when_nothing_is_left(stage: Stage) -> None:
 )
 def test_names_are_spoken(name: str, expected: str) -> None:
     assert spoken(name) == expected
+
+
+def test_where_the_executive_broke_no_node_is_blamed(stage: Stage) -> None:
+    stage.until_doing("pull")
+    stage.bench.world.broken["observe"] = RuntimeError("the cable is cut")
+    with pytest.raises(ExecutiveFailed):
+        stage.executive.run()
+    said = explained(stage)
+    assert "the cable is cut" in said.decided
+    assert (said.stop, said.chain) == ("", ())
