@@ -21,20 +21,16 @@ from functools import lru_cache
 
 import numpy as np
 
+from defras_sim.anatomy.anatomy import Anatomy
 from defras_sim.geometry import Floats
-from defras_sim.rest_shape import FlatFace, Slab
+from defras_sim.rest_shape import Face, FlatFace, Slab
 from defras_sim.scene import ElementName, MaterialName, Tissue
-from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.dent import Dent
-from defras_sim.tissue.discs import ROWS, disc_rows
-from defras_sim.tissue.elements import gauss_hexahedron
-from defras_sim.tissue.equilibrium import PotentialEnergy
-from defras_sim.tissue.factorisation import SparseCholesky
+from defras_sim.tissue.discs import ROWS
+from defras_sim.tissue.founded import UNIT_PA, FoundedTissue
 from defras_sim.tissue.graded_mesh import graded_breaks, graded_mesh
-from defras_sim.tissue.material_points import MaterialPoints
-from defras_sim.tissue.materials import lame_parameters
 from defras_sim.tissue.mesh import Mesh, SlabMesh, slab_mesh
-from defras_sim.tissue.terms import BoundaryTerm
+from defras_sim.tissue.tetrahedral_mesh import tetrahedral_mesh
 
 # Hardening pull in units of E r^2.
 HARDENING: dict[MaterialName, float] = {
@@ -47,9 +43,11 @@ HARDENING: dict[MaterialName, float] = {
 _WINDOW = 6.0
 _EDGE_SEEN = 3.0
 _EDGE_STEP = 0.1
+# On anatomies no two discs are alike: distances of the rim are told apart by this share of the
+# radius, thicknesses by this share of themselves.
+_RIM_STEP, _THICKNESS_STEP = 0.5, 0.04
 # Elements under the disc, in radii; they grow outside this many radii.
 _FINEST, _FINEST_DEEP, _CORE, _GROWTH = 0.5, 0.45, 1.2, 2.0
-_UNIT_PA = 1.0
 
 
 class DentsOf:
@@ -63,30 +61,86 @@ class DentsOf:
     def at(self, centers_xy_m: Floats, radius_m: float, *, upper: bool) -> Dent:
         """Dents of the rows (3 discs,) of discs around ``centers_xy_m`` (discs, 2).
 
-        Linear tetrahedra have none: they are there to share the faults of PyBullet's. Nor have
-        anatomies, for which no finer model is at hand.
+        Linear tetrahedra have none: they are there to share the faults of PyBullet's.
         """
         tissue, mesh, count = self._tissue, self._mesh, len(centers_xy_m)
-        if count == 0 or not isinstance(mesh, SlabMesh) or mesh.element == "tetrahedron4":
+        if count == 0 or mesh.element == "tetrahedron4":
             return Dent.none(ROWS * count)
-        size = (tissue.length_x_m, tissue.width_y_m, tissue.thickness_m)
-        # On hexahedra a disc is as good as its mirror image at small x and y; cells cut into
-        # tetrahedra have no mirror images.
-        mirrored = mesh.element == "hexahedron20"
-        distinct = -np.abs(centers_xy_m) if mirrored else centers_xy_m
-        places = np.unique(np.round(distinct, 9), axis=0, return_inverse=True)
-        give = np.array(
-            [
-                _missing_give(
-                    size, mesh.element, mesh.cells_xyz, tissue.poisson_ratio, x, y, radius_m, upper
-                )
-                for x, y in places[0].tolist()
-            ]
-        )[places[1]]
+        if isinstance(mesh, SlabMesh):
+            give = _missing_on_slab(tissue, mesh, centers_xy_m, radius_m, upper)
+        elif tissue.anatomy is not None:
+            places = tuple((x, y) for x, y in centers_xy_m.tolist())
+            depth = tissue.thickness_m
+            give = _missing_on_anatomy(
+                tissue.anatomy, depth, tissue.poisson_ratio, places, radius_m, upper
+            )
+        else:
+            raise ValueError(f"a mesh of {type(mesh).__name__} is neither a slab nor an anatomy")
         hardening = HARDENING[self._material] * tissue.young_modulus_pa * radius_m**2
         return Dent(
-            give.ravel() * (_UNIT_PA / tissue.young_modulus_pa), np.full(ROWS * count, hardening)
+            give.ravel() * (UNIT_PA / tissue.young_modulus_pa), np.full(ROWS * count, hardening)
         )
+
+
+def _missing_on_slab(
+    tissue: Tissue, mesh: SlabMesh, centers_xy_m: Floats, radius_m: float, upper: bool
+) -> Floats:
+    """Give (discs, 3) [m/N] that a slab's mesh lacks, at a Young's modulus of 1 Pa."""
+    size = (tissue.length_x_m, tissue.width_y_m, tissue.thickness_m)
+    # On hexahedra a disc is as good as its mirror image at small x and y; cells cut into
+    # tetrahedra have no mirror images.
+    distinct = -np.abs(centers_xy_m) if mesh.element == "hexahedron20" else centers_xy_m
+    places, which = np.unique(np.round(distinct, 9), axis=0, return_inverse=True)
+    give = [
+        _missing_give(
+            size, mesh.element, mesh.cells_xyz, tissue.poisson_ratio, x, y, radius_m, upper
+        )
+        for x, y in places.tolist()
+    ]
+    return np.array(give)[which]
+
+
+@lru_cache(maxsize=64)
+def _missing_on_anatomy(
+    anatomy: Anatomy,
+    depth_m: float,
+    poisson_ratio: float,
+    places_xy_m: tuple[tuple[float, float], ...],
+    radius_m: float,
+    upper: bool,
+) -> Floats:
+    """Give (discs, 3) [m/N] that an anatomy's mesh lacks, at a Young's modulus of 1 Pa.
+
+    Around a disc of a few millimetres it is taken for flat: a slab as thick as the tissue there,
+    that ends in one direction where the face's rim is nearest. A corner gives way further.
+    """
+    face: Face = anatomy.upper if upper else anatomy.lower
+    places = np.array(places_xy_m)
+    inside = np.array([face.inset(place, 0.0) for place in places])
+    height = anatomy.upper.at(inside)[:, 2] - anatomy.lower.at(inside)[:, 2]
+    upright = np.cross(*np.moveaxis(face.tangents(inside), 1, 0))[:, 2]
+    steps = np.log(height * np.abs(upright) / depth_m) / _THICKNESS_STEP
+    thickness = depth_m * np.exp(_THICKNESS_STEP * np.round(steps))
+    rim = (anatomy.upper if upper else anatomy.lower).rim_distance_m(inside)
+    step, window, seen = _RIM_STEP * radius_m, _WINDOW * depth_m, _EDGE_SEEN * depth_m
+    mesh = _founded_anatomy(anatomy, depth_m, poisson_ratio)
+    give = np.zeros((len(places), ROWS))
+    for disc, place in enumerate(inside):
+        shown = mesh.give(place, radius_m, face)
+        edge = step * max(1, round(rim[disc] / step)) if rim[disc] < seen else window
+        reach = tuple(round(each, 9) for each in (edge, window, window, window))
+        real = _real_give(reach, round(thickness[disc], 9), depth_m, poisson_ratio, radius_m, upper)
+        # The nearest rim may lie in any direction: the moments along both axes share.
+        real = np.array([real[0], real[1:].mean(), real[1:].mean()])
+        give[disc] = np.maximum(real - shown, 0.0)
+    give.flags.writeable = False
+    return give
+
+
+@lru_cache(maxsize=4)
+def _founded_anatomy(anatomy: Anatomy, depth_m: float, poisson_ratio: float) -> FoundedTissue:
+    """The whole anatomy on the model's own mesh."""
+    return FoundedTissue(tetrahedral_mesh(anatomy.volume_mesh), depth_m, poisson_ratio)
 
 
 Size = tuple[float, float, float]
@@ -112,7 +166,7 @@ def _missing_give(
     step = _EDGE_STEP * radius_m
     edges = (x_m + size_m[0] / 2, size_m[0] / 2 - x_m, y_m + size_m[1] / 2, size_m[1] / 2 - y_m)
     reach = tuple(round(step * round(e / step), 9) if e < seen else window for e in edges)
-    real = _real_give(reach, size_m[2], poisson_ratio, radius_m, upper)
+    real = _real_give(reach, size_m[2], size_m[2], poisson_ratio, radius_m, upper)
     return tuple(np.maximum(real - shown, 0.0).tolist())
 
 
@@ -120,11 +174,13 @@ def _missing_give(
 def _real_give(
     reach_m: tuple[float, ...],
     thickness_m: float,
+    depth_m: float,
     poisson_ratio: float,
     radius_m: float,
     upper: bool,
 ) -> Floats:
-    """Give of a disc on tissue that reaches as far as ``reach_m`` to -x, +x, -y, +y."""
+    """Give of a disc on a slab of ``thickness_m``, founded for ``depth_m``, that reaches as far as
+    ``reach_m`` to -x, +x, -y, +y."""
     finest, core = _FINEST * radius_m, _CORE * radius_m
     left, right, front, back = reach_m
     top = 0.0 if upper else -thickness_m
@@ -135,63 +191,19 @@ def _real_give(
             graded_breaks(-thickness_m, 0.0, top, _FINEST_DEEP * radius_m, 0.0, _GROWTH),
         )
     )
-    around = FlatFace(np.full(2, _WINDOW * thickness_m), top)
-    return _FoundedTissue(mesh, thickness_m, poisson_ratio).give(np.zeros(2), radius_m, around)
+    around = FlatFace(np.full(2, _WINDOW * depth_m), top)
+    return FoundedTissue(mesh, depth_m, poisson_ratio).give(np.zeros(2), radius_m, around)
 
 
 @lru_cache(maxsize=16)
 def _shown_by(
     size_m: Size, element: ElementName, cells_xyz: tuple[int, int, int], poisson_ratio: float
-) -> _FoundedTissue:
+) -> FoundedTissue:
     """The whole slab on the model's own mesh."""
     tissue = Tissue(length_x_m=size_m[0], width_y_m=size_m[1], thickness_m=size_m[2])
-    return _FoundedTissue(slab_mesh(tissue, element, cells_xyz), size_m[2], poisson_ratio)
+    return FoundedTissue(slab_mesh(tissue, element, cells_xyz), size_m[2], poisson_ratio)
 
 
 def _face(tissue: Tissue, upper: bool) -> FlatFace:
     slab = Slab(tissue.length_x_m, tissue.width_y_m, tissue.thickness_m)
     return slab.upper if upper else slab.lower
-
-
-class _FoundedTissue:
-    """Linear tissue with a Young's modulus of 1 Pa on an elastic foundation."""
-
-    def __init__(self, mesh: Mesh, thickness_m: float, poisson_ratio: float) -> None:
-        self._mesh = mesh
-        # All materials are the same to first order.
-        body = ElasticBody(mesh, "neo_hookean", *lame_parameters("neo_hookean", 1.0, poisson_ratio))
-        foundation = _Foundation(mesh, _UNIT_PA / (10 * thickness_m**2))
-        energy = PotentialEnergy(len(mesh.nodes_m), [body, foundation])
-        self._cholesky = SparseCholesky(mesh.nodes_m)
-        self._cholesky.factorise(energy.tangent(mesh.nodes_m))
-
-    def give(self, center_xy_m: Floats, radius_m: float, face: FlatFace) -> Floats:
-        """Motion per force (3,) of a disc's mean and first moments, averaged over x, y and z."""
-        rows = disc_rows(self._mesh, center_xy_m[None], radius_m, face).toarray()
-        forces = np.kron(rows, np.eye(3)).T
-        return np.einsum("ik,ik->k", forces, self._cholesky.solve(forces)).reshape(ROWS, 3).mean(1)
-
-
-class _Foundation(BoundaryTerm):
-    """Holds every bit of tissue where it rests, with ``stiffness`` [N/m per m^3]."""
-
-    name = "foundation"
-
-    def __init__(self, mesh: Mesh, stiffness: float) -> None:
-        # On tetrahedra the model's own rule is too coarse for a mass matrix by itself; with the
-        # tissue's stiffness added it does.
-        rule = gauss_hexahedron(3) if mesh.element == "hexahedron20" else mesh.quadrature
-        points = MaterialPoints.of(mesh, rule)
-        self._rest_m = mesh.nodes_m
-        self.pairs = points.pairs
-        mass = np.einsum("eq,qa,qb->eab", points.volumes_m3, points.values, points.values)
-        self._each = stiffness * mass.ravel()
-
-    def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
-        moved = positions_m - self._rest_m
-        gradient = np.zeros_like(moved)
-        np.add.at(gradient, self.pairs[:, 0], self._each[:, None] * moved[self.pairs[:, 1]])
-        return 0.5 * float(np.sum(gradient * moved)), gradient
-
-    def blocks(self, positions_m: Floats) -> Floats:
-        return self._each[:, None, None] * np.eye(3)
