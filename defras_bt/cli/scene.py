@@ -155,7 +155,9 @@ def from_mesh(
             status.update("looking whether the tissue lies still")
             require_rest(made)
     except RefusedSurface as error:
-        raise UserError(f"{surface}: {error}") from error
+        said = str(error)
+        # What is wrong with the file itself names it already.
+        raise UserError(said if said.startswith(str(surface)) else f"{surface}: {said}") from error
     write_scene(made, file)
     for repair in sound.repairs:
         console.print(f"Mended: {repair}.", markup=False)

@@ -69,3 +69,11 @@ def test_two_bodies_are_refused_with_the_name_of_the_file(defras, tmp_path):
     assert code == 2
     assert "pair.ply: the surface has 2 separate bodies" in error
     assert not out.exists()
+
+
+def test_a_file_that_is_no_surface_is_named_once(defras, tmp_path):
+    file = tmp_path / "points.xyz"
+    file.write_text("0 0 0")
+    code, _, error = defras("scene", "from-mesh", str(file), "--unit", "m")
+    assert code == 2
+    assert error.count("points.xyz") == 1
