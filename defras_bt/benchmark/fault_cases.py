@@ -70,6 +70,14 @@ def _up_or_down(rng: np.random.Generator) -> dict[str, Any]:
     return {"offset_m": (0.0, 0.0, float(rng.choice((-0.015, 0.015))))}
 
 
+def _arm(rng: np.random.Generator) -> dict[str, Any]:
+    return {"arm": str(rng.choice(("psm1", "psm2")))}
+
+
+def _jumped(rng: np.random.Generator) -> dict[str, Any]:
+    return {**_direction(0.02)(rng), **_arm(rng)}
+
+
 def _node(rng: np.random.Generator) -> dict[str, Any]:
     return {"node": str(rng.choice(("**/act/*", "**/force_accepted", "**/sensors_fresh")))}
 
@@ -91,7 +99,12 @@ _DRAWS: Mapping[str, Draw] = {
     "missing": _reading,
     "not_a_number": _reading,
     "displaced": _up_or_down,
-    "jumped": _direction(0.02),
+    "jumped": _jumped,
+    "not_following": _arm,
+    "commands_lost": _arm,
+    "republished": _arm,
+    "jaw_stuck": _arm,
+    "grasp_lost": _arm,
     "late_tree": _late,
     "node_raises": _node,
     "node_hangs": _node,
