@@ -34,10 +34,14 @@ def crowded() -> Scene:
 
 
 def same_outcomes(one, other) -> bool:
-    """Whether executions are the same but for rounding, which the number of threads changes."""
+    """Whether executions agree as well as rehearsals converge.
+
+    The number of threads changes the order of sums; a way through a snap then ends elsewhere within
+    the solver's tolerance, which for rehearsals is a few thousandths of the force.
+    """
     return len(one) == len(other) and all(
         (a.point, a.manoeuvres, a.finished) == (b.point, b.manoeuvres, b.finished)
-        and np.isclose(a.visibility, b.visibility, rtol=0, atol=1e-2)
-        and np.isclose(a.force_max_n, b.force_max_n, rtol=1e-6)
+        and np.isclose(a.visibility, b.visibility, rtol=0, atol=0.03)
+        and np.isclose(a.force_max_n, b.force_max_n, rtol=1e-2, atol=1e-3)
         for a, b in zip(one, other, strict=True)
     )
