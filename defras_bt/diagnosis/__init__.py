@@ -1,0 +1,1 @@
+"""What a simulation gets wrong: found in measured data, named, priced."""

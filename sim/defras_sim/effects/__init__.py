@@ -1,0 +1,1 @@
+"""Named physical causes by which reality differs from the plain model, one file each."""
