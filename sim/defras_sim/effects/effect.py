@@ -80,6 +80,11 @@ class Effect(ABC):
                 )
         return {p.name: float(values.get(p.name, p.null)) for p in self.parameters}
 
+    def is_null(self, values: Values) -> bool:
+        """Whether nothing that makes the effect strong differs from its null value."""
+        strengths = (p for p in self.parameters if p.strength)
+        return all(values.get(p.name, p.null) == p.null for p in strengths)
+
 
 class ArmEffect(Effect):
     """Changes where an arm really goes; acts on whole histories, so memory needs no state.
@@ -88,6 +93,8 @@ class ArmEffect(Effect):
     """
 
     layer: ClassVar[Layer] = "arm"
+    encoders_see: ClassVar[bool] = False
+    """Whether what the arm measures of itself shows it, as it shows a lag but no slack cable."""
 
     def joints(self, values: Values, time_s: Floats, joints: Floats) -> Floats:
         """True joint positions (n, 6) [rad, rad, m, rad, rad, rad] for those commanded (n, 6).
