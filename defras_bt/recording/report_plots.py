@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import base64
-import re
 from io import BytesIO
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -16,37 +14,18 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from defras_bt.recording import palette
+from defras_bt.recording.figures import FIGURE_STYLE, svg_text
 from defras_bt.recording.palette import css
 from defras_bt.recording.run_log import RunLog, Span
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 
-_STYLE: Any = {
-    # Text stays text: it takes the page's font and can be searched.
-    "svg.fonttype": "none",
-    "svg.hashsalt": "defras",
-    "font.family": "sans-serif",
-    "font.size": 9.0,
-    "axes.edgecolor": "#c3c9d0",
-    "axes.labelcolor": css(palette.INK),
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#e8ebee",
-    "grid.linewidth": 0.8,
-    "xtick.color": "#5c6672",
-    "ytick.color": "#5c6672",
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-}
 _METRIC_COLOURS = (palette.ESTIMATED, palette.MEDIAN, palette.ROI)
 
 
 def signals_svg(log: RunLog) -> str:
     """Actions, warning state, discrepancy, force, rate and visibility over one time axis."""
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(FIGURE_STYLE):
         figure = Figure(figsize=(10.2, 8.0))
         axes = figure.subplots(
             5, 1, sharex=True, height_ratios=[0.42, 0.3, 2, 2, 1.35], gridspec_kw={"hspace": 0.16}
@@ -66,7 +45,7 @@ def signals_svg(log: RunLog) -> str:
                 axis.axvspan(span.begin_s, span.end_s, color=shade, alpha=0.09, linewidth=0)
         axes[4].set_xlabel("world time [s]")
         figure.align_ylabels(list(axes))
-        return _svg(figure, "Signals of the run over time")
+        return svg_text(figure, "Signals of the run over time")
 
 
 def attachments_svg(
@@ -75,14 +54,14 @@ def attachments_svg(
     actual: NDArray[np.bool_] | None,
 ) -> str:
     """The holes from above, one map per belief; wrong ones stand out where the truth is known."""
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(FIGURE_STYLE):
         figure = Figure(figsize=(3.3 * len(columns), 3.5))
         axes = figure.subplots(1, len(columns), squeeze=False)[0]
         for axis, (title, held) in zip(axes, columns, strict=True):
             _attachment_map(axis, scene, held, actual)
             axis.set_title(title, fontsize=10, color=css(palette.INK), pad=6)
         figure.tight_layout()
-        return _svg(figure, "Attachments seen from above")
+        return svg_text(figure, "Attachments seen from above")
 
 
 def png_uri(picture: NDArray[np.uint8]) -> str:
@@ -226,14 +205,3 @@ def _attachment_map(
     axis.set_ylim(outline[:, 1].min() - margin, outline[:, 1].max() + margin)
     axis.set_aspect("equal")
     axis.axis("off")
-
-
-def _svg(figure: Figure, title: str) -> str:
-    buffer = BytesIO()
-    figure.savefig(
-        buffer, format="svg", bbox_inches="tight", metadata={"Date": None, "Title": title}
-    )
-    text = buffer.getvalue().decode()
-    text = text[text.index("<svg") :]
-    # The page's style sheet sizes the figure.
-    return re.sub(r'(<svg[^>]*?) width="[^"]*" height="[^"]*"', r"\1", text, count=1)
