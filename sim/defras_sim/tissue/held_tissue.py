@@ -69,6 +69,18 @@ class HeldTissue:
         self._holes.stiffness_n_per_m = stiffness_n_per_m
         self._energy = self._laid_out()
 
+    def lift_attachments(self, height_m: float) -> bool:
+        """Hold the tissue ``height_m`` higher than modelled; whether that is news.
+
+        Raises:
+            ValueError: not finite.
+        """
+        if height_m == self._holes.height_m:
+            return False
+        self._holes.height_m = height_m
+        self._energy = self._energy.with_term(self._holes.term)
+        return True
+
     def set_term(self, term: Term) -> bool:
         """Add ``term``, or put it in the place of the one of its name; whether laid out anew.
 

@@ -40,6 +40,7 @@ class Holes:
         self._rows = sparse.csr_array(places[:, np.repeat(self._is_hole, ROWS)] @ rows)
         self.targets_m: Floats = self._rows @ mesh.nodes_m
         self._springs = self._with_stiffness(scene.hole_stiffness_n_per_m(scene.attached))
+        self._height_m = 0.0
 
     def anchor_at(self, positions_m: Floats) -> None:
         """Hold the tissue from now on where it is when its nodes lie at ``positions_m``."""
@@ -65,9 +66,25 @@ class Holes:
         self._springs = self._with_stiffness(stiffness)
 
     @property
+    def height_m(self) -> float:
+        """How much higher than modelled the holes are."""
+        return self._height_m
+
+    @height_m.setter
+    def height_m(self, height_m: float) -> None:
+        if not np.isfinite(height_m):
+            raise ValueError(f"the height of the holes should be finite, is {height_m} m")
+        self._height_m = height_m
+
+    @property
     def term(self) -> SpringTerm:
         """The boundary term by which the holes hold the tissue."""
-        return SpringTerm(TERM_NAME, self._springs, self.targets_m)
+        targets = self.targets_m
+        if self._height_m != 0.0:
+            # Only the means move with a translation, the moments do not.
+            targets = targets.copy()
+            targets[::ROWS, 2] += self._height_m
+        return SpringTerm(TERM_NAME, self._springs, targets)
 
     def _with_stiffness(self, stiffness_n_per_m: Floats) -> Springs:
         return Springs(self._rows, np.repeat(stiffness_n_per_m, ROWS), self._dent)

@@ -130,6 +130,15 @@ class TissueModel:
         self._traveller.forget()
         self._rest_is_known = False
 
+    def lift_attachments(self, height_m: float) -> None:
+        """Let all attachments be ``height_m`` higher than modelled; then solve again.
+
+        Raises:
+            ValueError: not finite.
+        """
+        if self._held.lift_attachments(height_m):
+            self._rest_is_known = False
+
     @property
     def rest_m(self) -> Floats:
         """Nodes (nodes, 3) where nobody holds the tissue: the mesh's own unless loads act.

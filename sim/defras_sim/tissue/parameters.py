@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from defras_sim.geometry import Floats
-from defras_sim.tissue.discs import ROWS
+from defras_sim.tissue.discs import ROW_SHIFTS, ROWS
 from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.grasp import Grasp, term_name
 from defras_sim.tissue.holes import TERM_NAME as ATTACHMENTS
@@ -38,6 +38,18 @@ class HoleStiffness:
 
 
 @dataclass(frozen=True)
+class HoleStiffnesses:
+    """The stiffness of all holes at once: each grows by its number of ``by`` (holes,) [N/m]."""
+
+    by: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class AttachmentHeight:
+    """The height [m] of what all holes are part of."""
+
+
+@dataclass(frozen=True)
 class TipMotion:
     """The tip of an arm that holds: six columns, a translation [m] along x, y and z, and a rotation
     [rad] about the tip around x, y and z, all in the tissue frame."""
@@ -45,7 +57,7 @@ class TipMotion:
     arm: str
 
 
-Parameter = TermParameter | HoleStiffness | TipMotion
+Parameter = TermParameter | HoleStiffness | HoleStiffnesses | AttachmentHeight | TipMotion
 
 
 @dataclass(frozen=True)
@@ -57,6 +69,11 @@ class Balance:
     grasps: Mapping[str, Grasp]
     positions_m: Floats
     _pulls: dict[str, Pulls] = field(default_factory=dict)
+
+    @property
+    def holes(self) -> int:
+        """How many there are, whether they hold or not."""
+        return len(self.springs(ATTACHMENTS).targets_m) // ROWS
 
     def springs(self, name: str) -> SpringTerm:
         """The term called ``name``, which consists of springs.
@@ -132,11 +149,21 @@ def _change_of(parameter: Parameter, balance: Balance) -> Change:
         name = term_name(parameter.arm)
         stiffness = balance.pulls(name).stiffness_n_per_m
         return SpringChange(stiffness @ grasp.targets_by_tip_m(), name)
+    if isinstance(parameter, AttachmentHeight):
+        upwards = np.tile(np.outer(ROW_SHIFTS, (0.0, 0.0, 1.0)), (balance.holes, 1))
+        stiffness = balance.pulls(ATTACHMENTS).stiffness_n_per_m
+        return SpringChange(stiffness @ upwards[:, :, None], ATTACHMENTS)
+    if isinstance(parameter, HoleStiffnesses):
+        if len(parameter.by) != balance.holes:
+            raise ValueError(f"{len(parameter.by)} numbers given for {balance.holes} holes")
+        each = np.repeat(parameter.by, ROWS)[:, None, None]
+        by_stiffness = balance.pulls(ATTACHMENTS).forces_by_stiffness
+        return SpringChange(each * by_stiffness[:, :, None], ATTACHMENTS)
     if isinstance(parameter, HoleStiffness):
         by_stiffness = balance.pulls(ATTACHMENTS).forces_by_stiffness
-        holes = len(by_stiffness) // ROWS
-        if not 0 <= parameter.hole < holes:
-            raise ValueError(f"there is no hole {parameter.hole}; holes are 0 to {holes - 1}")
+        if not 0 <= parameter.hole < balance.holes:
+            last = balance.holes - 1
+            raise ValueError(f"there is no hole {parameter.hole}; holes are 0 to {last}")
         rows = slice(ROWS * parameter.hole, ROWS * (parameter.hole + 1))
         forces = np.zeros((len(by_stiffness), 3, 1))
         forces[rows, :, 0] = by_stiffness[rows]
