@@ -79,3 +79,17 @@ def repeated_rows(values: Floats) -> Mask:
     same = np.zeros(len(values), bool)
     same[1:] = (values[1:] == values[:-1]).all(axis=1)
     return same
+
+
+def spike_rows(position: Floats, far: float, among: Mask) -> Mask:
+    """Single rows (n,) of ``among`` farther than ``far`` from both neighbours that agree."""
+    rows = np.flatnonzero(among)
+    marked = np.zeros(len(position), bool)
+    if len(rows) < 3:
+        return marked
+    p = position[rows]
+    before, here, after = p[:-2], p[1:-1], p[2:]
+    away = np.minimum(np.linalg.norm(here - before, axis=1), np.linalg.norm(here - after, axis=1))
+    apart = np.linalg.norm(after - before, axis=1)
+    marked[rows[1:-1]] = (away > far) & (apart < 0.5 * away)
+    return marked
