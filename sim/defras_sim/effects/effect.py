@@ -103,8 +103,10 @@ class ArmEffect(Effect):
         """
         return joints
 
-    def tip_error(self, values: Values, tip_m: Floats, force_n: Floats) -> tuple[Floats, Floats]:
+    def tip_error(
+        self, values: Values, tip_m: Floats, force_n: Floats, rcm_m: Floats
+    ) -> tuple[Floats, Floats]:
         """Translation [m] and small rotation vector [rad] of the true tip (tissue frame), each
         (n, 3), where the arm believes its tip at ``tip_m`` (n, 3) and the tissue pulls at it with
-        ``force_n`` (n, 3)."""
+        ``force_n`` (n, 3). ``rcm_m`` (3,): the arm's remote centre of motion."""
         return 0.0 * tip_m, 0.0 * tip_m

@@ -37,7 +37,9 @@ class ToolOffset(ArmEffect):
         "fiducial sensing and recurrent neural networks (RA-L)"
     )
 
-    def tip_error(self, values: Values, tip_m: Floats, force_n: Floats) -> tuple[Floats, Floats]:
+    def tip_error(
+        self, values: Values, tip_m: Floats, force_n: Floats, rcm_m: Floats
+    ) -> tuple[Floats, Floats]:
         own = self.complete(values)
         shift_m = np.array([own[f"{a}_m"] for a in _AXES])
         turn = np.array([own[f"turn_{a}_rad"] for a in _AXES])
