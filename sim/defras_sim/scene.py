@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from defras_sim.advice import Advice
+from defras_sim.effects.effect import Extension
 from defras_sim.geometry import Floats
 from defras_sim.rest_shape import NotASlab
 from defras_sim.scene_faults import scene_faults
@@ -223,6 +224,14 @@ class Scene(Part):
         return self.model_copy(
             update={"attachments": self.attachments.model_copy(update={"map": drawn})}
         )
+
+    def extended(self, extension: Extension) -> Scene:
+        """The same scene with these effects adopted, and no others."""
+        adopted = tuple(
+            AdoptedEffect.model_validate({"effect": name, **values})
+            for name, values in extension.items()
+        )
+        return self.model_copy(update={"model": ModelExtension(effects=adopted)})
 
 
 def _spread(index: int, count: int, half_m: float) -> float:

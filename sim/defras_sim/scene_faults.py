@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from defras_sim.effects.adoption import adoption_faults
 from defras_sim.yaml_source import Location
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def scene_faults(scene: Scene) -> Iterator[SceneFault]:
     yield from _weight_faults(scene)
     yield from _mesh_faults(scene)
     yield from _setup_faults(scene)
+    yield from adoption_faults(scene.model)
     yield from _advice_faults(scene)
 
 
@@ -182,9 +184,6 @@ def _setup_faults(scene: Scene) -> Iterator[SceneFault]:
         if np.hypot(*np.subtract(camera.target_m, camera.position_m)[:2]) < 1e-6:
             message = f"{name}: looks straight up or down; move position_m or target_m sideways"
             yield (name, "position_m"), message
-    for i, adopted in enumerate(scene.model.effects):
-        message = f"model.effects.{i}: effect {adopted.effect!r} is unknown; available: none yet"
-        yield ("model", "effects", i), message
 
 
 def _advice_faults(scene: Scene) -> Iterator[SceneFault]:

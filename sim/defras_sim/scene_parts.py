@@ -6,6 +6,7 @@ tick of 50 s.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -140,14 +141,27 @@ class Thresholds(Part):
 
 
 class AdoptedEffect(BaseModel):
-    """An effect the twin runs with; further keys are its parameters."""
+    """An effect the twin runs with; further keys are its parameters, null where not given."""
 
-    model_config = ConfigDict(extra="allow", frozen=True)
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+    __pydantic_extra__: dict[str, float]
     effect: str
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Parameters by name."""
+        return self.__pydantic_extra__
 
 
 class ModelExtension(Part):
+    """How the model differs from the plain one: effects that were found, and adopted."""
+
     effects: tuple[AdoptedEffect, ...] = ()
+
+    @property
+    def extension(self) -> dict[str, Mapping[str, float]]:
+        """Parameters of each adopted effect by its name."""
+        return {adopted.effect: adopted.values for adopted in self.effects}
 
 
 class Simulation(Part):
