@@ -95,6 +95,8 @@ class ArmEffect(Effect):
     layer: ClassVar[Layer] = "arm"
     encoders_see: ClassVar[bool] = False
     """Whether what the arm measures of itself shows it, as it shows a lag but no slack cable."""
+    place: ClassVar[int] = 0
+    """Along the drive from the motor to the tip: effects of a smaller place act first."""
 
     def joints(self, values: Values, time_s: Floats, joints: Floats) -> Floats:
         """True joint positions (n, 6) [rad, rad, m, rad, rad, rad] for those commanded (n, 6).
