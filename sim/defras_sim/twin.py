@@ -8,44 +8,61 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from defras_sim.effects.camera_layer import CameraLayer
+from defras_sim.effects.extended_tissue import ExtendedTissue
+from defras_sim.effects.layers import Layers
 from defras_sim.geometry import Pose
+from defras_sim.held_motion import HeldMotion
 from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene
-from defras_sim.tissue.model import NothingToGrasp, TissueModel
+from defras_sim.tissue.model import NothingToGrasp
 from defras_sim.tissue.state import TissueState
+from defras_sim.worlds.protocol import PointCloud
 
 Mask = NDArray[np.bool_]
 
 # Stiffnesses through which a hole that starts (or stops) to hold is led: the tissue under a hole
 # gives way near 40 N/m, so most of the change of shape happens between 1 and 1000 N/m.
 _RAMP_N_PER_M = np.array([1.0, 4.0, 10.0, 25.0, 60.0, 150.0, 500.0, RIGID_HOLE_N_PER_M])
+# Tissue gives way a hundred times as far as an arm: two rounds find where both come to rest.
+_GIVING_ROUNDS = 3
 
 
 @dataclass(frozen=True)
 class _Grip:
-    """An arm that holds: its tip when the jaw closed, and the other holding tips at that time."""
+    """An arm that holds: where its jaw closed, and where the others held at that time."""
 
     arm: str
-    tip: Pose
+    jaw: Pose
     others: Mapping[str, Pose]
 
 
 class Twin:
-    """The believed tissue, led along by the arms' setpoints.
+    """The believed tissue, led along by the arms' setpoints, and the camera that looks at it.
+
+    Commanded motion goes through the layers arm, grasp and tissue, each changed by those effects
+    of ``scene.model`` that act on it; clouds are led back through camera and clock.
 
     Example:
         >>> twin = Twin(scene)
-        >>> twin.grasp("psm1", setpoints["psm1"])
+        >>> twin.grasp("psm1", setpoints["psm1"], time_s)
         >>> state = twin.track(setpoints, time_s)
-        >>> state.surface, twin.force_n
+        >>> state.surface, twin.force_n, twin.corrected(cloud)
     """
 
     def __init__(self, scene: Scene) -> None:
+        """Raises ValueError where the scene adopts what no tissue can have."""
+        layers = Layers.of(scene.model.extension)
         self._scene = scene
-        self._model = TissueModel(scene)
+        self._motion = HeldMotion(scene, layers)
+        self._tissue = ExtendedTissue(scene, layers.tissue)
+        self._camera = CameraLayer(scene.depth_camera, layers.camera)
+        self._delay_s = layers.delay_s
+        self._time_s = 0.0
         self._grips: list[_Grip] = []
-        self._tips: dict[str, Pose] = {}
-        """Holding tips that were last asked for; not reached while the state is stale."""
-        self._state = self._model.solve({})
+        self._jaws: dict[str, Pose] = {}
+        """Where held patches were last asked to be; not reached while the state is stale."""
+        self._corrected: tuple[PointCloud, PointCloud] | None = None
+        self._state = self._tissue.solve({}, self._time_s)
 
     @property
     def scene(self) -> Scene:
@@ -70,45 +87,83 @@ class Twin:
         forces = self._state.grasp_forces_n.values()
         return max((float(np.linalg.norm(force)) for force in forces), default=0.0)
 
-    def grasp(self, arm: str, tissue_from_tip: Pose) -> None:
-        """``arm`` takes the tissue at its tip.
+    def grasp(self, arm: str, tissue_from_tip: Pose, time_s: float | None = None) -> None:
+        """``arm`` takes the tissue with its set-point at the pose, at world time ``time_s`` (that
+        of the last call where none is given).
 
         Raises:
-            ValueError: the arm holds already, or its tip is not on the believed tissue.
+            ValueError: the arm holds already, its set-point is not finite, or its tip is not on
+                the believed tissue.
         """
         if arm in self.holding:
             raise ValueError(f"{arm} holds tissue already; release it first")
-        self._model.grasp(arm, tissue_from_tip)
-        self._grips.append(_Grip(arm, tissue_from_tip, self._tips))
-        self._solve({**self._tips, arm: tissue_from_tip})
+        self._reach(time_s)
+        self._motion.follow({arm: _finite(arm, {arm: tissue_from_tip})}, self._time_s)
+        jaw = self._motion.take(arm, self._time_s)
+        try:
+            self._tissue.grasp(arm, jaw)
+        except NothingToGrasp:
+            self._motion.let_go(arm)
+            raise
+        self._grips.append(_Grip(arm, jaw, self._jaws))
+        self._solve({**self._jaws, arm: jaw})
 
-    def release(self, arm: str) -> None:
+    def release(self, arm: str, time_s: float | None = None) -> None:
         """``arm`` lets go; an arm that holds nothing stays as it is."""
         if arm not in self.holding:
             return
-        self._model.release(arm)
+        self._reach(time_s)
+        self._tissue.release(arm)
+        self._motion.let_go(arm)
         self._grips = [
-            replace(grip, others={name: tip for name, tip in grip.others.items() if name != arm})
+            replace(grip, others={name: jaw for name, jaw in grip.others.items() if name != arm})
             for grip in self._grips
             if grip.arm != arm
         ]
-        self._solve({name: tip for name, tip in self._tips.items() if name != arm})
+        self._solve({name: jaw for name, jaw in self._jaws.items() if name != arm})
 
     def track(self, setpoints: Mapping[str, Pose], time_s: float) -> TissueState:
         """Predict the tissue for the arms' setpoints (tissue_from_tip) at world time ``time_s``.
 
-        Arms that hold nothing do not matter. Nothing is solved if no holding tip moved. Where the
-        model cannot follow, the last good state comes back with ``converged`` False.
+        Nothing is solved if no held patch moved and the tissue is none that changes with time.
+        Where the model cannot follow, the last good state comes back with ``converged`` False.
 
         Raises:
             ValueError: a holding arm has no setpoint, or it is not finite.
         """
-        wanted = {arm: _finite(arm, setpoints) for arm in self.holding}
+        for arm in self.holding:
+            _finite(arm, setpoints)
         if not np.isfinite(time_s):
             raise ValueError(f"time_s should be finite, is {time_s}")
-        if not all(_same(wanted[arm], self._tips[arm]) for arm in wanted):
+        self._reach(time_s)
+        self._motion.follow(
+            {arm: pose for arm, pose in setpoints.items() if _is_finite(pose)}, self._time_s
+        )
+        due = self._tissue.is_due(self._time_s)
+        for _ in range(_GIVING_ROUNDS):
+            wanted = self._motion.held(self._time_s, self._state.grasp_forces_n)
+            if not due and all(_same(wanted[arm], self._jaws[arm]) for arm in wanted):
+                break
             self._solve(wanted)
+            due = False
+            if not self._motion.gives or not self._state.converged:
+                break
         return self._state
+
+    def corrected(self, cloud: PointCloud) -> PointCloud:
+        """What the camera would have reported if it were as the scene says: points (n, 3) where
+        they truly were, stamped when they truly were there."""
+        if self._camera.is_plain and self._delay_s == 0.0:
+            return cloud
+        if self._corrected is None or self._corrected[0] is not cloud:
+            points_m = self._camera.corrected(cloud.points_m)
+            true = PointCloud(cloud.stamp_s - self._delay_s, points_m)
+            self._corrected = (cloud, true)
+        return self._corrected[1]
+
+    def measured(self, arm: str) -> Pose:
+        """tissue_from_tip that the encoders of ``arm`` should say at the last set-point."""
+        return self._motion.measured(arm)
 
     def set_attached(self, attached: Mask) -> TissueState:
         """Believe from now on that the holes ``attached`` (holes,) hold; keep the grasps.
@@ -122,23 +177,28 @@ class Twin:
         if attached.shape != before.shape:
             raise ValueError(f"attached should mark {before.size} holes, has {attached.shape}")
         self._scene = self._scene.with_attached(attached)
-        start = self._model.snapshot()
+        start = self._tissue.snapshot()
         for lead in (self._at_once, self._ramp, self._repeat_motion):
-            self._model.restore(start)
+            self._tissue.restore(start)
             if lead(before, attached):
-                return self._solve(self._tips)
-        self._model.restore(start)
+                return self._solve(self._jaws)
+        self._tissue.restore(start)
         self._state = replace(self._state, converged=False)
         return self._state
 
-    def _solve(self, tips: Mapping[str, Pose]) -> TissueState:
-        self._tips = dict(tips)
-        self._state = self._model.solve(self._tips)
+    def _reach(self, time_s: float | None) -> None:
+        """World time is ``time_s`` now; a tissue with a memory cannot go back."""
+        if time_s is not None:
+            self._time_s = max(self._time_s, time_s)
+
+    def _solve(self, jaws: Mapping[str, Pose]) -> TissueState:
+        self._jaws = dict(jaws)
+        self._state = self._tissue.solve(self._jaws, self._time_s)
         return self._state
 
     def _at_once(self, before: Mask, after: Mask) -> bool:
-        self._model.set_hole_stiffness(self._scene.hole_stiffness_n_per_m(after))
-        return self._model.solve(self._tips).converged
+        self._tissue.set_hole_stiffness(self._scene.hole_stiffness_n_per_m(after))
+        return self._tissue.solve(self._jaws, self._time_s).converged
 
     def _ramp(self, before: Mask, after: Mask) -> bool:
         """Let the changed holes hold (or give way) little by little."""
@@ -147,31 +207,35 @@ class Twin:
             stiffness = self._scene.hole_stiffness_n_per_m(before & after)
             stiffness[after & ~before] = rising
             stiffness[before & ~after] = falling
-            self._model.set_hole_stiffness(stiffness)
-            if not self._model.solve(self._tips).converged:
+            self._tissue.set_hole_stiffness(stiffness)
+            if not self._tissue.solve(self._jaws, self._time_s).converged:
                 return False
         return self._at_once(before, after)
 
     def _repeat_motion(self, before: Mask, after: Mask) -> bool:
         """Start from the resting tissue and take every grasp again, in order."""
-        self._model.set_hole_stiffness(self._scene.hole_stiffness_n_per_m(after))
-        self._model.reset()
+        self._tissue.set_hole_stiffness(self._scene.hole_stiffness_n_per_m(after))
+        self._tissue.reset()
         for grip in self._grips:
-            self._model.solve(grip.others)
+            self._tissue.solve(grip.others, self._time_s)
             try:
-                self._model.grasp(grip.arm, grip.tip)
+                self._tissue.grasp(grip.arm, grip.jaw)
             except NothingToGrasp:  # where a second arm took raised tissue that now lies lower
                 return False
-        return self._model.solve(self._tips).converged
+        return self._tissue.solve(self._jaws, self._time_s).converged
 
 
 def _finite(arm: str, setpoints: Mapping[str, Pose]) -> Pose:
     if arm not in setpoints:
         raise ValueError(f"{arm} holds tissue but has no setpoint; given: {sorted(setpoints)}")
     pose = setpoints[arm]
-    if not (np.isfinite(pose.position_m).all() and np.isfinite(pose.rotation).all()):
+    if not _is_finite(pose):
         raise ValueError(f"the setpoint of {arm} is not finite: {pose.position_m}")
     return pose
+
+
+def _is_finite(pose: Pose) -> bool:
+    return bool(np.isfinite(pose.position_m).all() and np.isfinite(pose.rotation).all())
 
 
 def _same(one: Pose, other: Pose) -> bool:

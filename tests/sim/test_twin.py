@@ -127,7 +127,7 @@ def test_each_way_of_leading_to_a_new_belief_ends_alike(
         twin, tip = lifted(believed)
         assert getattr(twin, way)(believed.attached, more)
         shapes.append(twin._solve({"psm1": tip}))
-        assert twin._model.hole_stiffness_n_per_m.max() == believed.hold_n_per_m
+        assert twin._tissue.model.hole_stiffness_n_per_m.max() == believed.hold_n_per_m
     for shape in shapes:
         assert shape.converged
         gap = shape.surface.vertices_m - shapes[0].surface.vertices_m
