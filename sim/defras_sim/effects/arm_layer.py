@@ -25,8 +25,8 @@ class ArmLayer:
     def __init__(self, rcm_m: Floats, effects: Sequence[tuple[ArmEffect, Values]]) -> None:
         """``rcm_m`` (3,): the arm's remote centre of motion in the tissue frame."""
         self._rcm_m = np.asarray(rcm_m, float)
-        self._effects = tuple(effects)
-        self._on_joints = [each for each in effects if _acts_on_joints(each[0])]
+        self._effects = tuple(sorted(effects, key=lambda each: each[0].place))
+        self._on_joints = [each for each in self._effects if _acts_on_joints(each[0])]
         self._joints = History(6)
         self._setpoint: Pose | None = None
         self._moved: Pose | None = None
