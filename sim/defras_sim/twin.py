@@ -49,15 +49,19 @@ class Twin:
         >>> state.surface, twin.force_n, twin.corrected(cloud)
     """
 
-    def __init__(self, scene: Scene) -> None:
-        """Raises ValueError where the scene adopts what no tissue can have."""
+    def __init__(self, scene: Scene, *, start_s: float = 0.0) -> None:
+        """The tissue has been at rest until world time ``start_s``.
+
+        Raises:
+            ValueError: the scene adopts what no tissue can have.
+        """
         layers = Layers.of(scene.model.extension)
         self._scene = scene
         self._motion = HeldMotion(scene, layers)
         self._tissue = ExtendedTissue(scene, layers.tissue)
         self._camera = CameraLayer(scene.depth_camera, layers.camera)
         self._delay_s = layers.delay_s
-        self._time_s = 0.0
+        self._time_s = start_s
         self._grips: list[_Grip] = []
         self._jaws: dict[str, Pose] = {}
         """Where held patches were last asked to be; not reached while the state is stale."""
@@ -122,6 +126,13 @@ class Twin:
         ]
         self._solve({name: jaw for name, jaw in self._jaws.items() if name != arm})
 
+    def follow(self, setpoints: Mapping[str, Pose], time_s: float) -> None:
+        """The arms are told to be at ``setpoints`` at ``time_s``; the tissue is not asked yet."""
+        self._reach(time_s)
+        self._motion.follow(
+            {arm: pose for arm, pose in setpoints.items() if _is_finite(pose)}, self._time_s
+        )
+
     def track(self, setpoints: Mapping[str, Pose], time_s: float) -> TissueState:
         """Predict the tissue for the arms' setpoints (tissue_from_tip) at world time ``time_s``.
 
@@ -135,10 +146,7 @@ class Twin:
             _finite(arm, setpoints)
         if not np.isfinite(time_s):
             raise ValueError(f"time_s should be finite, is {time_s}")
-        self._reach(time_s)
-        self._motion.follow(
-            {arm: pose for arm, pose in setpoints.items() if _is_finite(pose)}, self._time_s
-        )
+        self.follow(setpoints, time_s)
         due = self._tissue.is_due(self._time_s)
         for _ in range(_GIVING_ROUNDS):
             wanted = self._motion.held(self._time_s, self._state.grasp_forces_n)

@@ -1,0 +1,120 @@
+"""What the twin says of a whole recorded motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from defras_sim.effects.camera_layer import CameraLayer
+from defras_sim.effects.layers import Layers
+from defras_sim.geometry import Floats, Pose
+from defras_sim.recorded_motion import RecordedMotion
+from defras_sim.scene import Scene
+from defras_sim.surface import Surface
+from defras_sim.tissue.mesh import Integers
+from defras_sim.tissue.state import TissueState
+from defras_sim.twin import Twin
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What tissue and arms do over a motion, at ``time_s`` (m,): its instants ``rows`` (m,).
+
+    ``states`` are the tissue's, stale where the model could not follow. ``measured`` is by arm
+    where the encoders should say that its tip is (tissue_from_tip). Clouds stamped ``delay_s``
+    later, seen through ``camera``, show these states.
+    """
+
+    rows: Integers
+    time_s: Floats
+    states: tuple[TissueState, ...]
+    measured: Mapping[str, tuple[Pose, ...]]
+    camera: CameraLayer
+    delay_s: float
+
+    @cached_property
+    def vertices_m(self) -> Floats:
+        """Surface vertices (m, vertices, 3), NaN where the state is stale."""
+        shape = self.states[0].surface.vertices_m.shape
+        lost = np.full(shape, np.nan)
+        return np.stack([s.surface.vertices_m if s.converged else lost for s in self.states])
+
+    def force_n(self, arm: str) -> Floats:
+        """Force (m, 3) of a jaw on the tissue; 0 without a grip, NaN where the state is stale."""
+        none, lost = np.zeros(3), np.full(3, np.nan)
+        return np.array(
+            [s.grasp_forces_n.get(arm, none) if s.converged else lost for s in self.states]
+        )
+
+    def surface_shown(self, stamp_s: float) -> Surface:
+        """The surface (vertices NaN where stale) that a cloud of this stamp shows.
+
+        Between two instants it is interpolated; beyond the first and the last it is theirs.
+        """
+        first = self.states[0].surface
+        time_s = stamp_s - self.delay_s
+        after = int(np.clip(np.searchsorted(self.time_s, time_s), 1, len(self.time_s) - 1))
+        if len(self.time_s) == 1:
+            vertices_m = self.vertices_m[0]
+        else:
+            start_s, end_s = self.time_s[after - 1 : after + 1]
+            share = float(np.clip((time_s - start_s) / (end_s - start_s), 0.0, 1.0))
+            before_m, then_m = self.vertices_m[after - 1 : after + 1]
+            vertices_m = before_m + share * (then_m - before_m) if share < 1.0 else then_m
+        return Surface(vertices_m, first.triangles, first.upper, first.rest_xy_m)
+
+
+def predict(scene: Scene, motion: RecordedMotion, rows: Integers | None = None) -> Prediction:
+    """What the twin of ``scene``, with the effects it adopts, does along ``motion``.
+
+    The arms follow every instant; the tissue is solved at ``rows`` of them (all of them, where
+    none are given), and where a grip begins or ends. Effects of history are integrated between
+    solved instants.
+
+    Raises:
+        NothingToGrasp: a jaw takes tissue where the twin has none.
+        ValueError: the scene adopts what no tissue can have, or the motion has arms that the scene
+            has not.
+    """
+    unknown = set(motion.arms) - set(scene.arms)
+    if unknown:
+        raise ValueError(
+            f"the motion is one of {', '.join(sorted(motion.arms))}; the scene {scene.name} has "
+            f"the arms {', '.join(scene.arms)}"
+        )
+    wanted = np.ones(len(motion), bool)
+    if rows is not None:
+        wanted[:] = False
+        wanted[rows] = True
+    for arm in motion.arms.values():
+        wanted[1:] |= arm.grasped[1:] != arm.grasped[:-1]
+        wanted[0] |= arm.grasped[0]
+    solved = np.flatnonzero(wanted)
+    twin = Twin(scene, start_s=float(motion.time_s[0]))
+    states: list[TissueState] = []
+    measured: dict[str, list[Pose]] = {name: [] for name in motion.arms}
+    for row in range(int(solved[-1]) + 1 if len(solved) else 0):
+        time_s, tips = float(motion.time_s[row]), motion.tips(row)
+        if not wanted[row]:
+            twin.follow(tips, time_s)
+            continue
+        for name, arm in motion.arms.items():
+            if arm.grasped[row] and name not in twin.holding:
+                twin.grasp(name, tips[name], time_s)
+            elif name in twin.holding and not arm.grasped[row]:
+                twin.release(name, time_s)
+        states.append(twin.track(tips, time_s))
+        for name, poses in measured.items():
+            poses.append(twin.measured(name))
+    layers = Layers.of(scene.model.extension)
+    return Prediction(
+        rows=solved,
+        time_s=motion.time_s[solved],
+        states=tuple(states),
+        measured={name: tuple(poses) for name, poses in measured.items()},
+        camera=CameraLayer(scene.depth_camera, layers.camera),
+        delay_s=layers.delay_s,
+    )
