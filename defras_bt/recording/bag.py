@@ -84,6 +84,9 @@ class BagRecorder:
                 self._write(f"{arm}/{topic}", ros.JOINT, now_s, stamp_s, message)
         jaw = ros.joint_message(stamp_s, ("jaw",), np.array([seen.jaw_rad]))
         self._write(f"{arm}/jaw/measured_js", ros.JOINT, now_s, stamp_s, jaw)
+        if seen.force_n is not None:
+            message = ros.force_message(stamp_s, seen.force_n)
+            self._write(f"{arm}/body/measured_cf", ros.WRENCH, now_s, stamp_s, message)
         if seen.grasped is not None:
             message = ros.flag_message(seen.grasped)
             self._write(f"{arm}/grasped", ros.FLAG, now_s, stamp_s, message)

@@ -104,9 +104,13 @@ def _arm(arm: ArmObservation) -> Mapping[str, Any]:
         "jaw_rad": arm.jaw_rad,
         "grasped": arm.grasped,
     }
-    for name, joints in (("joints", arm.joints), ("setpoint_joints", arm.setpoint_joints)):
-        if joints is not None:
-            said[name] = joints.tolist()
+    for name, numbers in (
+        ("joints", arm.joints),
+        ("setpoint_joints", arm.setpoint_joints),
+        ("force_n", arm.force_n),
+    ):
+        if numbers is not None:
+            said[name] = numbers.tolist()
     return said
 
 
@@ -119,6 +123,7 @@ def _read_arm(said: Mapping[str, Any]) -> ArmObservation:
         grasped=said["grasped"],
         joints=np.array(said["joints"]) if "joints" in said else None,
         setpoint_joints=np.array(said["setpoint_joints"]) if "setpoint_joints" in said else None,
+        force_n=np.array(said["force_n"]) if "force_n" in said else None,
     )
 
 

@@ -19,6 +19,7 @@ CLOUD = "sensor_msgs/msg/PointCloud2"
 FLAG = "std_msgs/msg/Bool"
 NUMBER = "std_msgs/msg/Float64"
 TEXT = "std_msgs/msg/String"
+WRENCH = "geometry_msgs/msg/WrenchStamped"
 
 _FLOAT32 = 7
 
@@ -75,6 +76,16 @@ def cloud_message(stamp_s: float, points_m: Floats) -> bytes:
         is_dense=bool(np.isfinite(points).all()),
     )
     return encoded(CLOUD, message)
+
+
+def force_message(stamp_s: float, force_n: Floats) -> bytes:
+    """A force (3,) along the axes of the tissue frame, without a torque."""
+    types = TYPES.types
+    vector = types["geometry_msgs/msg/Vector3"]
+    wrench = types["geometry_msgs/msg/Wrench"](
+        force=vector(*map(float, force_n)), torque=vector(0.0, 0.0, 0.0)
+    )
+    return encoded(WRENCH, types[WRENCH](header=_header(stamp_s), wrench=wrench))
 
 
 def flag_message(value: bool) -> bytes:

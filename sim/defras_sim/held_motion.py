@@ -50,6 +50,10 @@ class HeldMotion:
         """tissue_from_tip: where an arm's encoders say that its tip is."""
         return self._arms[arm].measured()
 
+    def jaw(self, arm: str, time_s: float) -> Pose:
+        """tissue_from_jaw: where ``arm`` would take the tissue if its jaw closed now."""
+        return GraspLayer(self._layers.grasp, time_s, self.tip(arm)).taken
+
     def take(self, arm: str, time_s: float) -> Pose:
         """``arm`` closes its jaw; where (tissue_from_jaw) it really takes the tissue."""
         self._grips[arm] = GraspLayer(self._layers.grasp, time_s, self.tip(arm))

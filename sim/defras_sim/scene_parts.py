@@ -101,11 +101,16 @@ class Roi(Part):
 
 
 class Arm(Part):
-    """A patient-side manipulator: where its remote centre of motion stands, and its side."""
+    """A patient-side manipulator: where its remote centre of motion stands, and its side.
+
+    ``force_noise_sd_n``: noise along each axis of a force sensor at the jaw; without it the arm has
+    no such sensor. What it says is recorded for diagnosis; the executive never acts on it.
+    """
 
     rcm_m: Vector
     home_tip_m: Vector
     side: Literal["+y", "-y"]
+    force_noise_sd_n: Annotated[float, Field(ge=0, le=10)] | None = None
 
 
 class Camera(Part):

@@ -1,22 +1,28 @@
-"""ModelWorld: the tissue model with the actual attachments, perfect tools and ray-cast cameras."""
+"""ModelWorld: the tissue model with the actual attachments, kinematic tools, ray-cast cameras."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from defras_sim.camera.depth import depth_cloud_m
 from defras_sim.camera.ray_caster import RayCaster
 from defras_sim.camera.visibility import roi_visibility
+from defras_sim.effects.camera_layer import CameraLayer
+from defras_sim.effects.extended_tissue import ExtendedTissue
+from defras_sim.effects.layers import Layers
 from defras_sim.geometry import Pose
+from defras_sim.held_motion import HeldMotion
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
-from defras_sim.tissue.model import TissueModel
 from defras_sim.worlds.clock import TickClock
 from defras_sim.worlds.error import WorldError
+from defras_sim.worlds.force_sensor import NO_FORCE, measured_force_n
 from defras_sim.worlds.jaw_contact import meets_tissue
 from defras_sim.worlds.kinematic_tool import KinematicTool
+from defras_sim.worlds.late import LateReadings
 from defras_sim.worlds.protocol import (
     HOLD,
     ArmCommand,
@@ -33,15 +39,23 @@ TIP_NOISE_SD_M = 2e-5
 class ModelWorld:
     """A quasi-static reality for a scene, on the mesh of ``scene.simulated``.
 
-    Equal scenes, commands and generators give equal runs.
+    The effects that the scene adopts are real here: tips go elsewhere than their encoders say,
+    tissue slips and fades, the cloud is displaced and late. Equal scenes, commands and generators
+    give equal runs.
     """
 
     name = "model"
 
     def __init__(self, scene: Scene, rng: np.random.Generator) -> None:
-        """``scene`` is the actual one. ``rng`` makes the sensors' noise."""
+        """``scene`` is the actual one. ``rng`` makes the sensors' noise.
+
+        Raises:
+            WorldError: the tissue finds no equilibrium at rest.
+            ValueError: the scene adopts what no tissue can have.
+        """
         self.tick_s = scene.tick_s
         self._scene = scene
+        layers = Layers.of(scene.model.extension)
         self._rng = rng
         self._clock = TickClock(scene.tick_s)
         self._command = HOLD
@@ -49,8 +63,17 @@ class ModelWorld:
         self._tools = {
             arm: KinematicTool.at(np.array(part.home_tip_m)) for arm, part in scene.arms.items()
         }
-        self._model = TissueModel(scene.simulated)
-        self._state = self._model.solve({})
+        self._force_noise_sd_n: dict[str, float | None] = {
+            arm: part.force_noise_sd_n for arm, part in scene.arms.items()
+        }
+        self._motion = HeldMotion(scene, layers)
+        self._motion.follow({arm: tool.tissue_from_tip for arm, tool in self._tools.items()}, 0.0)
+        self._camera = CameraLayer(scene.depth_camera, layers.camera)
+        self._clouds = LateReadings[PointCloud](layers.delay_s, _restamped)
+        self._tissue = ExtendedTissue(scene.simulated, layers.tissue)
+        self._jaws: dict[str, Pose] = {}
+        """Where the held patches were carried last."""
+        self._state = self._tissue.solve({}, 0.0)
         if not self._state.converged:
             raise WorldError("the tissue finds no equilibrium at rest")
         self._latest = Observation(0.0, {})
@@ -84,15 +107,19 @@ class ModelWorld:
         for arm, tool in self._tools.items():
             held = tool.grasped
             motion = self._command.arms.get(arm, ArmCommand())
-            acted = tool.step(motion, self.tick_s, self._on_tissue)
-            if tool.grasped != held:
-                if tool.grasped:
-                    self._model.grasp(arm, tool.tissue_from_tip)
-                else:
-                    self._model.release(arm)
-            changed |= acted and (held or tool.grasped)
+            tool.step(motion, self.tick_s, partial(self._on_tissue, arm))
+            self._motion.follow({arm: tool.tissue_from_tip}, self.time_s)
+            if tool.grasped and not held:
+                self._tissue.grasp(arm, self._motion.take(arm, self.time_s))
+            elif held and not tool.grasped:
+                self._motion.let_go(arm)
+                self._tissue.release(arm)
+            changed |= tool.grasped != held
         self._command = HOLD
-        if changed:
+        jaws = self._motion.held(self.time_s, self._state.grasp_forces_n)
+        changed |= any(not _equal(jaw, self._jaws.get(arm)) for arm, jaw in jaws.items())
+        self._jaws = jaws
+        if self._tissue.is_due(self.time_s) or changed:
             self._settle()
         self._sense()
 
@@ -107,16 +134,17 @@ class ModelWorld:
         self._closed = True
         self._command = HOLD
 
-    def _on_tissue(self, tissue_from_tip: Pose) -> bool:
-        return meets_tissue(self._state.surface, tissue_from_tip.position_m)
+    def _on_tissue(self, arm: str, tissue_from_tip: Pose) -> bool:
+        self._motion.follow({arm: tissue_from_tip}, self.time_s)
+        jaw = self._motion.jaw(arm, self.time_s)
+        return meets_tissue(self._state.surface, jaw.position_m)
 
     def _settle(self) -> None:
-        tips: dict[str, Pose] = {
-            arm: tool.tissue_from_tip for arm, tool in self._tools.items() if tool.grasped
-        }
-        state = self._model.solve(tips)
+        state = self._tissue.solve(self._jaws, self.time_s)
         if not state.converged:
-            where = ", ".join(f"{arm} at {np.round(p.position_m, 4)} m" for arm, p in tips.items())
+            where = ", ".join(
+                f"{arm} at {np.round(p.position_m, 4)} m" for arm, p in self._jaws.items()
+            )
             raise WorldError(
                 f"at {self.time_s:.2f} s the actual tissue has no equilibrium near the last one "
                 f"({where or 'nothing held'}); the motion is too far or too fast for the model"
@@ -134,21 +162,42 @@ class ModelWorld:
             tissue = RayCaster(surface)
             if cloud_due:
                 points = depth_cloud_m(scene.depth_camera, surface, tissue, self._rng)
-                update = replace(update, cloud=PointCloud(self.time_s, points))
+                cloud = PointCloud(self.time_s, self._camera.reported(points))
+                self._clouds.add(self.time_s, cloud)
             if picture_due:
                 seen = roi_visibility(scene, tissue)
                 update = replace(update, roi_visibility=seen, roi_visibility_stamp_s=self.time_s)
+        arrived = self._clouds.arrived(self.time_s)
+        if arrived is not None:
+            update = replace(update, cloud=arrived)
         self._latest = update
 
     def _read_arms(self) -> dict[str, ArmObservation]:
-        return {arm: self._read_arm(tool) for arm, tool in self._tools.items()}
+        return {arm: self._read_arm(arm, tool) for arm, tool in self._tools.items()}
 
-    def _read_arm(self, tool: KinematicTool) -> ArmObservation:
+    def _read_arm(self, arm: str, tool: KinematicTool) -> ArmObservation:
         noise = TIP_NOISE_SD_M * self._rng.standard_normal(3)
         return ArmObservation(
             stamp_s=self.time_s,
-            tissue_from_tip=tool.tissue_from_tip.moved(noise),
+            tissue_from_tip=self._motion.measured(arm).moved(noise),
             setpoint_tissue_from_tip=tool.tissue_from_tip,
             jaw_rad=tool.jaw_rad,
             grasped=tool.grasped,
+            force_n=measured_force_n(
+                self._force_noise_sd_n[arm],
+                self._state.grasp_forces_n.get(arm, NO_FORCE),
+                self._rng,
+            ),
         )
+
+
+def _restamped(cloud: PointCloud, stamp_s: float) -> PointCloud:
+    return PointCloud(stamp_s, cloud.points_m)
+
+
+def _equal(one: Pose, other: Pose | None) -> bool:
+    return one is other or (
+        other is not None
+        and np.array_equal(one.position_m, other.position_m)
+        and np.array_equal(one.rotation, other.rotation)
+    )

@@ -22,6 +22,8 @@ class ArmObservation:
 
     ``joints`` and ``setpoint_joints`` (6,): yaw, pitch [rad], insertion [m], roll, wrist pitch,
     wrist yaw [rad]; None for a world without joints. ``grasped`` is None where nothing tells.
+    ``force_n`` (3,) is what a force sensor says that the jaw exerts on the tissue, None without
+    one; it is recorded, and nothing is decided by it.
     """
 
     stamp_s: float
@@ -31,6 +33,7 @@ class ArmObservation:
     grasped: bool | None = None
     joints: Floats | None = None
     setpoint_joints: Floats | None = None
+    force_n: Floats | None = None
 
 
 @dataclass(frozen=True)
