@@ -1,0 +1,1 @@
+"""What the engine can be asked about: a tissue, an arm, a specimen of material."""

@@ -1,0 +1,155 @@
+"""What is compared of a recording and a model: one row per channel, one column per frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from defras_bt.diagnosis.problem import Channel, Integers
+from defras_bt.diagnosis.twins.tissue_cells import AssignedCloud, CellGrid
+from defras_bt.diagnosis.twins.tissue_frames import TissueFrames
+from defras_bt.diagnosis.twins.tissue_phases import PHASES
+from defras_bt.diagnosis.twins.tissue_trajectory import Trajectory
+from defras_sim.geometry import Floats
+from defras_sim.scene import Camera, Scene
+
+CLOUD_FLOOR_M = 0.0003
+"""Of a patch's mean distance: meshes of the twin's kind differ by as much."""
+FORCE_FLOOR_N = 0.005
+FORCE_FLOOR_SHARE = 0.05
+"""Of the largest force measured: the twin's force is as good as that."""
+TIP_FLOOR_M = 0.0001
+_FEW_FRAMES = 8
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which rows there are: the patches of ``grid``, then force and tip of each arm along x, y, z.
+
+    ``with_force``, ``with_tip``: arms of which that was measured in some recording.
+    """
+
+    grid: CellGrid
+    with_force: tuple[str, ...]
+    with_tip: tuple[str, ...]
+
+    @staticmethod
+    def of(scene: Scene, trajectories: Sequence[Trajectory]) -> Layout:
+        arms = tuple(scene.arms)
+        return Layout(
+            CellGrid.over(scene.tissue),
+            tuple(a for a in arms if any(a in each.forces_n for each in trajectories)),
+            tuple(a for a in arms if any(a in each.tips_m for each in trajectories)),
+        )
+
+    @property
+    def rows(self) -> int:
+        return len(self.grid) + 3 * len(self.with_force) + 3 * len(self.with_tip)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        forces = [f"{arm} force {axis}" for arm in self.with_force for axis in _AXES]
+        tips = [f"{arm} tip {axis}" for arm in self.with_tip for axis in _AXES]
+        return (*self.grid.names, *forces, *tips)
+
+    def residual(
+        self,
+        trajectory: Trajectory,
+        assigned: Sequence[AssignedCloud],
+        frames: TissueFrames,
+        camera: Camera,
+    ) -> Floats:
+        """Measured minus predicted (rows, frames); distances are positive where tissue was seen
+        outside of the model's. NaN where nothing can be compared."""
+        return np.concatenate(
+            [
+                cloud_residual_m(assigned, frames, camera, len(self.grid)),
+                *(self._beside(trajectory.forces_n, frames.forces_n, a) for a in self.with_force),
+                *(self._beside(trajectory.tips_m, frames.tips_m, a) for a in self.with_tip),
+            ]
+        )
+
+    @staticmethod
+    def _beside(
+        measured: Mapping[str, Floats], predicted: Mapping[str, Floats], arm: str
+    ) -> Floats:
+        """Measured minus predicted (3, frames) of one arm."""
+        count = len(next(iter(predicted.values())))
+        return np.asarray((measured.get(arm, np.full((count, 3), np.nan)) - predicted[arm]).T)
+
+    def channels(self, noise_sd: Floats, largest_force_n: float) -> tuple[Channel, ...]:
+        """Every row with what its sensor scatters (rows,)."""
+        cells, force_floor_n = (
+            len(self.grid),
+            max(FORCE_FLOOR_N, FORCE_FLOOR_SHARE * largest_force_n),
+        )
+        found = []
+        for row, name in enumerate(self.names):
+            if row < cells:
+                x, y = self.grid.places_m[row]
+                sd = float(noise_sd[row])
+                found.append(Channel(name, "cloud", "m", sd, CLOUD_FLOOR_M, (float(x), float(y))))
+            elif row < cells + 3 * len(self.with_force):
+                found.append(Channel(name, "force", "N", float(noise_sd[row]), force_floor_n))
+            else:
+                found.append(Channel(name, "tip", "m", float(noise_sd[row]), TIP_FLOOR_M))
+        return tuple(found)
+
+
+def cloud_residual_m(
+    assigned: Sequence[AssignedCloud], frames: TissueFrames, camera: Camera, cells: int
+) -> Floats:
+    """Mean distance (cells, frames) of each patch's points off the model's visible surface."""
+    found = np.full((cells, len(assigned)), np.nan)
+    for frame, (cloud, surface) in enumerate(zip(assigned, frames.surfaces, strict=True)):
+        if surface is not None:
+            found[:, frame] = cloud.residual_m(frames.corrected(cloud.points_m), surface, camera)
+    return found
+
+
+def noise_sd(
+    residual: Sequence[Floats], phases: Sequence[Integers], rows_alike: Integers
+) -> Floats:
+    """What each row (rows,) scatters by itself.
+
+    From the frames before anything was grasped, where only the sensor changes; where those are few,
+    from how much neighbouring frames differ. ``rows_alike`` (rows,) numbers rows of one kind of
+    sensor: a row that was never seen gets the median of its kind.
+    """
+    rest_index = PHASES.index("rest")
+    spread = []
+    for each, phase in zip(residual, phases, strict=True):
+        rest = each[:, phase == rest_index]
+        steps = np.diff(each, axis=1) / np.sqrt(2.0)
+        spread.append(
+            np.where(
+                np.isfinite(rest).sum(axis=1) >= _FEW_FRAMES,
+                _spread(rest - _middle(rest)),
+                _spread(steps),
+            )
+        )
+    found = _middle(np.stack(spread, axis=1))[:, 0]
+    for kind in np.unique(rows_alike):
+        mine = rows_alike == kind
+        known = found[mine & np.isfinite(found) & (found > 0)]
+        typical = float(np.median(known)) if len(known) else 0.0
+        found[mine] = np.where(np.isfinite(found[mine]), found[mine], typical)
+        # A row that happened to be still for a few frames is no better than its kind.
+        found[mine] = np.maximum(found[mine], 0.3 * typical)
+    return found
+
+
+def _middle(values: Floats) -> Floats:
+    """Median (rows, 1) of the finite values of each row, NaN where there are none."""
+    found = np.full((len(values), 1), np.nan)
+    some = np.isfinite(values).any(axis=1)
+    found[some, 0] = np.nanmedian(values[some], axis=1)
+    return found
+
+
+def _spread(values: Floats) -> Floats:
+    """Robust standard deviation (rows,) about zero, from the median of magnitudes."""
+    return 1.4826 * _middle(np.abs(values))[:, 0]

@@ -1,0 +1,110 @@
+"""One recording as a trajectory: the frames that are compared, and what was measured in them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from defras_bt.diagnosis.problem import Integers
+from defras_bt.diagnosis.recording import Readings, RecordedRun
+from defras_bt.diagnosis.twins.tissue_phases import PHASES, phases
+from defras_sim.geometry import Floats
+from defras_sim.recorded_motion import ArmMotion, RecordedMotion
+from defras_sim.scene import Scene
+
+MOST_FRAMES = 160
+"""Frames beyond this many are thinned out evenly: neighbours say nearly the same."""
+_AFTER_RELEASE_S = 1.0
+"""Tissue let go swings for a while, and a model in equilibrium cannot know how."""
+_REST = PHASES.index("rest")
+_RELEASED = PHASES.index("after release")
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """``frames`` (f,): the instants of ``motion`` at which the camera looked, and ``clouds_m`` what
+    it saw then; ``phase`` (f,) in :data:`PHASES`. By arm: ``tips_m`` (f, 3) as measured and
+    ``forces_n`` (f, 3), NaN where nothing was measured.
+    """
+
+    name: str
+    motion: RecordedMotion
+    frames: Integers
+    phase: Integers
+    clouds_m: tuple[Floats, ...]
+    tips_m: Mapping[str, Floats]
+    forces_n: Mapping[str, Floats]
+
+    @property
+    def time_s(self) -> Floats:
+        """Of the frames (f,)."""
+        return np.asarray(self.motion.time_s[self.frames])
+
+
+def trajectory(run: RecordedRun, scene: Scene, most_frames: int = MOST_FRAMES) -> Trajectory:
+    """The frames of ``run`` that can be compared: those while the arms have set-points, without
+    the swinging after a release."""
+    told_s = run.motion.time_s
+    stamps = run.cloud_times_s
+    known = (stamps >= told_s[0] - 1e-6) & (stamps <= told_s[-1] + 1e-6)
+    motion = _with_instants(run.motion, stamps[known])
+    rows = np.searchsorted(motion.time_s, stamps[known] - 1e-7)
+    phase = phases(motion, scene)
+    usable = ~_swinging(motion, phase)[rows]
+    rows, clouds = rows[usable], np.flatnonzero(known)[usable]
+    stride = max(1, int(np.ceil(len(rows) / most_frames)))
+    rows, clouds = rows[::stride], clouds[::stride]
+    time_s = motion.time_s[rows]
+    period_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.1
+
+    def around(readings: Mapping[str, Readings]) -> dict[str, Floats]:
+        return {arm: each.mean_around(time_s, period_s / 2) for arm, each in readings.items()}
+
+    within_s = 3 * period_s
+    return Trajectory(
+        run.name,
+        motion,
+        rows.astype(np.int64),
+        phase[rows],
+        tuple(run.clouds[i].points_m for i in clouds),
+        {arm: each.at(time_s, within_s) for arm, each in run.measured_m.items()},
+        around(run.forces_n),
+    )
+
+
+def _swinging(
+    motion: RecordedMotion, phase: Integers
+) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Instants (n,) shortly after an arm let go."""
+    found = np.zeros(len(motion), bool)
+    for arm in motion.arms.values():
+        for let_go in np.flatnonzero(arm.grasped[:-1] & ~arm.grasped[1:]) + 1:
+            since_s = motion.time_s - motion.time_s[let_go]
+            found |= (since_s >= 0) & (since_s < _AFTER_RELEASE_S)
+    return found
+
+
+def _with_instants(motion: RecordedMotion, time_s: Floats) -> RecordedMotion:
+    """``motion`` with further instants (m,), at which each arm is between its set-points and holds
+    what it held at the last one."""
+    known_s = motion.time_s
+    near = np.abs(known_s[np.clip(np.searchsorted(known_s, time_s), 0, len(known_s) - 1)] - time_s)
+    before = np.abs(known_s[np.clip(np.searchsorted(known_s, time_s) - 1, 0, None)] - time_s)
+    new_s = time_s[(near > 1e-6) & (before > 1e-6)]
+    if len(new_s) == 0:
+        return motion
+    all_s = np.union1d(known_s, new_s)
+    last = np.clip(np.searchsorted(known_s, all_s + 1e-9, side="right") - 1, 0, None)
+    inside = np.clip(all_s, known_s[0], known_s[-1])
+
+    def between(arm: ArmMotion) -> ArmMotion:
+        position = np.stack(
+            [np.interp(inside, known_s, arm.position_m[:, k]) for k in range(3)], axis=1
+        )
+        turning = Slerp(known_s, Rotation.from_matrix(arm.rotation))
+        return ArmMotion(position, turning(inside).as_matrix(), arm.grasped[last])
+
+    return RecordedMotion(all_s, {name: between(arm) for name, arm in motion.arms.items()})
