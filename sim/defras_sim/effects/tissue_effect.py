@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 from defras_sim.effects.effect import Effect, Layer, TwinName, Values
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
+from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.model import TissueModel
 from defras_sim.tissue.parameters import Parameter
 from defras_sim.tissue.state import TissueState
@@ -85,14 +86,19 @@ class Evolution:
         return ()
 
 
-@dataclass
-class Steady(Evolution):
-    """An effect that does not change with time, with its directions."""
+def base_material(terms: Terms) -> ElasticBody:
+    """The elastic body among ``terms``, for effects of a rank at which it is still one.
 
-    known: tuple[Direction, ...] = ()
-
-    def directions(self) -> tuple[Direction, ...]:
-        return self.known
+    Raises:
+        TypeError: it is none any more.
+    """
+    body = terms["material"]
+    if not isinstance(body, ElasticBody):
+        raise TypeError(
+            f"the material is a {type(body).__name__} already; effects that build on an elastic "
+            "body should have a lower rank than those that wrap it"
+        )
+    return body
 
 
 class TissueEffect(Effect):
@@ -114,3 +120,13 @@ class TissueEffect(Effect):
     def begin(self, values: Values, model: TissueModel) -> Evolution:
         """Go along with ``model``, whose tissue rests and was not touched yet."""
         return Evolution()
+
+
+class Steady(Evolution):
+    """An effect that does not change with time, with its directions."""
+
+    def __init__(self, known: tuple[Direction, ...]) -> None:
+        self._known = known
+
+    def directions(self) -> tuple[Direction, ...]:
+        return self._known

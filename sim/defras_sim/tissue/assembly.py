@@ -70,6 +70,17 @@ class ElasticBody:
             self.mesh, self.material, mu_pa, lam_pa, modes=self.modes, points=self.points
         )
 
+    def scaled(self, factor: float) -> ElasticBody:
+        """The same body with ``factor`` times the energy."""
+        return self.with_lame(factor * self.mu_pa, factor * self.lam_pa)
+
+    def with_modes(self, modes: Mapping[str, Floats]) -> ElasticBody:
+        """The same body with further fields by which its stiffness may grow."""
+        everything = {**self.modes, **modes}
+        return ElasticBody(
+            self.mesh, self.material, self.mu_pa, self.lam_pa, modes=everything, points=self.points
+        )
+
     def with_points(self, points: MaterialPoints) -> ElasticBody:
         """The same material on another rest shape: see :meth:`MaterialPoints.thickened`."""
         return ElasticBody(
@@ -121,11 +132,31 @@ class ElasticBody:
             return self.modes[parameter] * self.mu_pa, self.modes[parameter] * self.lam_pa
         raise unknown_parameter(self, parameter)
 
+    @property
+    def shear_pa(self) -> Floats:
+        """Shear modulus (elements, points) at small strain."""
+        return materials.shear_modulus_pa(self.material, self.mu_pa)
+
+    @property
+    def young_pa(self) -> Floats:
+        """Young's modulus (elements, points) at small strain."""
+        return materials.young_modulus_pa(self.material, self.mu_pa, self.lam_pa)
+
     def stress_pa(self, F: Floats) -> Floats:
         """First Piola stress of deformation gradients F (elements, points, 3, 3)."""
-        stress = np.empty_like(F)
-        kernels.stresses(self._code, F, self.mu_pa, self.lam_pa, stress)
-        return stress
+        return self.density_and_stress(F)[1]
+
+    def density_and_stress(self, F: Floats) -> tuple[Floats, Floats]:
+        """Energy density (elements, points) [J/m^3] and first Piola stress, shaped as F [Pa]."""
+        density, stress = np.empty(F.shape[:2]), np.empty_like(F)
+        kernels.stresses(self._code, F, self.mu_pa, self.lam_pa, density, stress)
+        return density, stress
+
+    def stress_tangent(self, F: Floats) -> Floats:
+        """dP/dF (elements, points, 9, 9) [Pa]."""
+        tangent = np.empty((*F.shape[:2], 9, 9))
+        kernels.tangents(self._code, F, self.mu_pa, self.lam_pa, tangent)
+        return tangent
 
     def force_scale_n(self) -> float:
         """A force that deforms the whole body by its own size: what residuals are compared to."""

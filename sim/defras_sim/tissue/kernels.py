@@ -100,8 +100,17 @@ def tangent(
 
 
 @jit
-def stresses(code: int, F: Floats, mu: Floats, lam: Floats, out: Floats) -> None:
-    """Write the first Piola stress of every F (elements, points, 3, 3) to ``out``."""
+def stresses(code: int, F: Floats, mu: Floats, lam: Floats, density: Floats, out: Floats) -> None:
+    """Write ``density`` (elements, points) [J/m^3], and the first Piola stress of every F
+    (elements, points, 3, 3) to ``out``."""
     for e in range(F.shape[0]):
         for q in range(F.shape[1]):
-            materials.stress(code, F[e, q], mu[e, q], lam[e, q], out[e, q])
+            density[e, q] = materials.stress(code, F[e, q], mu[e, q], lam[e, q], out[e, q])
+
+
+@jit
+def tangents(code: int, F: Floats, mu: Floats, lam: Floats, out: Floats) -> None:
+    """Write dP/dF of every F (elements, points, 3, 3) to ``out`` (elements, points, 9, 9)."""
+    for e in range(F.shape[0]):
+        for q in range(F.shape[1]):
+            materials.tangent(code, F[e, q], mu[e, q], lam[e, q], out[e, q])

@@ -107,7 +107,7 @@ class MaterialTerm(ABC):
 
     A term says what happens at points, all of them at once: F comes as (elements, points, 3, 3).
     A subclass is a frozen dataclass with ``name`` and ``points``, those of the body that it belongs
-    to, among its fields.
+    to, among its fields. A term that ``is_nothing`` is there for its derivatives only.
     """
 
     name: str
@@ -122,6 +122,19 @@ class MaterialTerm(ABC):
     def stress_tangent(self, F: Floats) -> Floats:
         """dP/dF (elements, points, 9, 9) [Pa], row 3 i + J and column 3 k + L; symmetric."""
 
+    @property
+    def is_nothing(self) -> bool:
+        """Whether it has no energy whatever the deformation."""
+        return False
+
+    def scaled(self, factor: float) -> MaterialTerm:
+        """The same with ``factor`` times the energy.
+
+        Raises:
+            TypeError: the term cannot.
+        """
+        raise TypeError(f"{type(self).__name__} {self.name!r} has no scaled()")
+
     def stress_by(self, parameter: str, F: Floats) -> Floats:
         """Derivative of P by a parameter at fixed F; a term with parameters overrides this."""
         raise unknown_parameter(self, parameter)
@@ -131,10 +144,14 @@ class MaterialTerm(ABC):
         return self.points.pairs
 
     def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
+        if self.is_nothing:
+            return 0.0, np.zeros_like(positions_m)
         density, stress = self.density_and_stress(self.points.deformation(positions_m))
         return float(np.sum(density * self.points.volumes_m3)), self.points.nodal(stress)
 
     def add_tangent(self, positions_m: Floats, places: Places, entries: Floats) -> None:
+        if self.is_nothing:
+            return
         tangents = self.stress_tangent(self.points.deformation(positions_m))
         integration.add_stiffness(
             np.ascontiguousarray(tangents),

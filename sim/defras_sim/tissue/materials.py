@@ -45,9 +45,7 @@ def lame_parameters(
 
 def lame_by_poisson(material: MaterialName, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:
     """Derivatives of what :func:`lame_parameters` gives by Poisson's ratio at fixed E [Pa]."""
-    if material == "stable_neo_hookean":
-        mu = 3 / 4 * mu
-        lam = lam - 5 / 6 * mu
+    mu, lam = _linear(material, mu, lam)
     nu = lam / (2 * (lam + mu))
     young = 2 * mu * (1 + nu)
     mu_by = -young / (2 * (1 + nu) ** 2)
@@ -55,6 +53,23 @@ def lame_by_poisson(material: MaterialName, mu: Floats, lam: Floats) -> tuple[Fl
     if material == "stable_neo_hookean":
         return 4 / 3 * mu_by, lam_by + 5 / 6 * mu_by
     return mu_by, lam_by
+
+
+def shear_modulus_pa(material: MaterialName, mu: Floats) -> Floats:
+    """Small-strain shear modulus, for the mu that the material's formula takes."""
+    return 3 / 4 * mu if material == "stable_neo_hookean" else mu
+
+
+def young_modulus_pa(material: MaterialName, mu: Floats, lam: Floats) -> Floats:
+    """Small-strain Young's modulus: what :func:`lame_parameters` was given."""
+    mu, lam = _linear(material, mu, lam)
+    return mu * (3 * lam + 2 * mu) / (lam + mu)
+
+
+def _linear(material: MaterialName, mu: Floats, lam: Floats) -> tuple[Floats, Floats]:
+    """Lame parameters of linear elasticity."""
+    shear = shear_modulus_pa(material, mu)
+    return shear, lam - 5 / 6 * shear if material == "stable_neo_hookean" else lam
 
 
 @jit

@@ -1,0 +1,65 @@
+"""The tissue is free where the model holds it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from defras_sim.effects.disc import PLACE, Disc
+from defras_sim.effects.effect import EffectParameter, Values
+from defras_sim.effects.holding import by_holes, weakened_by, weakened_n_per_m
+from defras_sim.effects.tissue_effect import Direction, Evolution, TissueEffect
+from defras_sim.geometry import Floats
+from defras_sim.scene import Scene
+from defras_sim.tissue.model import TissueModel
+
+STRENGTH = "share"
+
+
+class MissingAttachment(TissueEffect):
+    """Attachments in a disc have lost a share of their hold (:mod:`defras_sim.effects.holding`)."""
+
+    name = "missing_attachment"
+    sentence = "The tissue is free where the model holds it."
+    parameters = (
+        EffectParameter(
+            STRENGTH, "1", null=0.0, lower=0.0, upper=1.0, step=0.5,
+            meaning="share of the hold that the attachments of the disc lack; 1 is free",
+        ),
+        *PLACE,
+    )  # fmt: skip
+    falsified_by = "The tissue over the disc stays down as modelled when it is lifted beside it."
+    excited_by = "A lift beside the disc, until the attachments there would carry it."
+    source = "Tagliabue et al. (2022), attachment points as boundary conditions."
+
+    def begin(self, values: Values, model: TissueModel) -> Evolution:
+        rim_m = model.scene.attachments.hole_pitch_m
+        return _Weakened(Disc.of(values, rim_m), values[STRENGTH], model.scene)
+
+
+class _Weakened(Evolution):
+    def __init__(self, disc: Disc, share: float, scene: Scene) -> None:
+        self._disc, self._strength, self._xy_m = disc, share, scene.holes_xy_m
+        self._share = disc.share(self._xy_m)
+        self._whole_n_per_m = np.zeros(len(self._xy_m))
+
+    def hold_n_per_m(self, stiffness_n_per_m: Floats) -> Floats:
+        self._whole_n_per_m = stiffness_n_per_m
+        return weakened_n_per_m(stiffness_n_per_m, self._strength * self._share)
+
+    def directions(self) -> tuple[Direction, ...]:
+        slope = weakened_by(self._whole_n_per_m, self._strength * self._share)
+        if self._strength == 0.0:
+            held_m = self._xy_m[self._whole_n_per_m > 0]
+            if not len(held_m):
+                return ()
+            return tuple(
+                Direction(STRENGTH, disc.place, by_holes(slope * disc.share(self._xy_m)))
+                for disc in self._disc.elsewhere(held_m)
+            )
+        by = {STRENGTH: self._share}
+        for name, each in self._disc.share_by(self._xy_m).items():
+            by[name] = self._strength * each
+        return tuple(Direction(name, {}, by_holes(slope * each)) for name, each in by.items())
+
+
+EFFECT = MissingAttachment()
