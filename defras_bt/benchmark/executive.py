@@ -232,10 +232,10 @@ class _TimedTwin(Twin):
         super().__init__(scene)
         self._watch = watch
 
-    def grasp(self, arm: str, tissue_from_tip: Pose) -> None:
+    def grasp(self, arm: str, tissue_from_tip: Pose, time_s: float | None = None) -> None:
         pass
 
-    def release(self, arm: str) -> None:
+    def release(self, arm: str, time_s: float | None = None) -> None:
         pass
 
     def track(self, setpoints: Mapping[str, Pose], time_s: float) -> TissueState:

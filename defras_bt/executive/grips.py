@@ -21,9 +21,9 @@ class HoldsTissue(Protocol):
     @property
     def scene(self) -> Scene: ...
 
-    def grasp(self, arm: str, tissue_from_tip: Pose) -> None: ...
+    def grasp(self, arm: str, tissue_from_tip: Pose, time_s: float) -> None: ...
 
-    def release(self, arm: str) -> None: ...
+    def release(self, arm: str, time_s: float) -> None: ...
 
 
 class GripTracker:
@@ -49,14 +49,14 @@ class GripTracker:
             if arm.grasped and not holding:
                 tip = arm.setpoint_tissue_from_tip
                 try:
-                    self._twin.grasp(name, tip)
+                    self._twin.grasp(name, tip, observation.time_s)
                 except NothingToGrasp as miss:
                     contradictions[name] = f"{name} says that it holds tissue, but {miss}"
                     continue
                 self._board.grips[name] = Grip(self._point_of(name, tip), tip)
                 changed = True
             elif not arm.grasped and holding:
-                self._twin.release(name)
+                self._twin.release(name, observation.time_s)
                 del self._board.grips[name]
                 # The tissue fell back, and the tip may be anywhere: a new grasp needs a new reach.
                 self._board.at.pop(name, None)

@@ -18,7 +18,7 @@ from defras_bt.sensing.latest import LatestReadings
 from defras_bt.sensing.sense import SensedObservation, sense
 from defras_sim.tissue.state import TissueState
 from defras_sim.twin import Twin
-from defras_sim.worlds.protocol import Command, Observation
+from defras_sim.worlds.protocol import Command, Observation, PointCloud
 
 
 class Perception:
@@ -69,13 +69,15 @@ class Perception:
             setpoints = {n: arm.setpoint_tissue_from_tip for n, arm in sensed.arms.items()}
             state = self._twin.track(setpoints, sensed.time_s)
             force_n = self._twin.force_n
-            reading = self._monitored(sensed, state)
+            # What is recorded is what was reported; what is compared is what that means.
+            cloud = None if sensed.cloud is None else self._twin.corrected(sensed.cloud)
+            reading = self._monitored(cloud, state, sensed.time_s)
             if board.grips and "cloud" not in missing:
                 self._keyframes.add(
                     sensed.time_s,
                     {name: grip.grasp_tip for name, grip in board.grips.items()},
                     {name: setpoints[name] for name in board.grips},
-                    sensed.cloud,
+                    cloud,
                 )
         self._count_force(force_n, scene.tick_s)
         return TickInputs(
@@ -102,13 +104,15 @@ class Perception:
             return {}
         return {"clock": f"the world's clock stands still at {time_s:.2f} s"}
 
-    def _monitored(self, sensed: SensedObservation, state: TissueState) -> MonitorReading | None:
+    def _monitored(
+        self, cloud: PointCloud | None, state: TissueState, time_s: float
+    ) -> MonitorReading | None:
         # Tissue that was held once may lie otherwise: rest is what was seen before.
         if not self._board.rest_calibrated and not self._touched:
-            self._monitor.observe_rest(sensed.cloud, state.surface)
+            self._monitor.observe_rest(cloud, state.surface)
         if not self._monitor.calibration:
             return None
-        return self._monitor.reading(sensed.cloud, state.surface, sensed.time_s)
+        return self._monitor.reading(cloud, state.surface, time_s)
 
     def _count_force(self, force_n: float, tick_s: float) -> None:
         # So written, a force or a threshold that is not a number counts as over.

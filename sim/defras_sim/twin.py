@@ -65,7 +65,6 @@ class Twin:
         self._grips: list[_Grip] = []
         self._jaws: dict[str, Pose] = {}
         """Where held patches were last asked to be; not reached while the state is stale."""
-        self._corrected: tuple[PointCloud, PointCloud] | None = None
         self._state = self._tissue.solve({}, self._time_s)
 
     @property
@@ -163,11 +162,8 @@ class Twin:
         they truly were, stamped when they truly were there."""
         if self._camera.is_plain and self._delay_s == 0.0:
             return cloud
-        if self._corrected is None or self._corrected[0] is not cloud:
-            points_m = self._camera.corrected(cloud.points_m)
-            true = PointCloud(cloud.stamp_s - self._delay_s, points_m)
-            self._corrected = (cloud, true)
-        return self._corrected[1]
+        points_m = self._camera.corrected(cloud.points_m)
+        return PointCloud(cloud.stamp_s - self._delay_s, points_m)
 
     def measured(self, arm: str) -> Pose:
         """tissue_from_tip that the encoders of ``arm`` should say at the last set-point."""

@@ -268,7 +268,7 @@ class TestGrips:
         assert not np.isnan(senses.look().force_n)
 
     def test_a_grip_where_the_twin_has_no_tissue_is_a_reading_that_cannot_be(self, senses):
-        def nothing_there(arm, tip):
+        def nothing_there(arm, tip, time_s):
             raise NothingToGrasp("the tip is 40.0 mm from the tissue")
 
         senses.look()

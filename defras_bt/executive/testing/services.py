@@ -44,16 +44,19 @@ class BenchTwin:
     def force_n(self) -> float:
         return self.feels_n if self.holding else 0.0
 
-    def grasp(self, arm: str, tissue_from_tip: Pose) -> None:
+    def grasp(self, arm: str, tissue_from_tip: Pose, time_s: float) -> None:
         self.holding.add(arm)
 
-    def release(self, arm: str) -> None:
+    def release(self, arm: str, time_s: float) -> None:
         self.holding.remove(arm)
 
     def track(self, setpoints: Mapping[str, Pose], time_s: float) -> TissueState:
         if self.broken is not None:
             raise self.broken
         return flat_state()
+
+    def corrected(self, cloud: PointCloud) -> PointCloud:
+        return cloud
 
     def set_attached(self, attached: NDArray[np.bool_]) -> None:
         self.scene = self.scene.with_attached(attached)
