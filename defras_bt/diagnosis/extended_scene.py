@@ -31,10 +31,11 @@ def adopted_effects(scene: Scene, verdict: Verdict) -> list[dict[str, Any]]:
         ValueError: two causes set one parameter of an effect to different values.
     """
     adopted: dict[str, dict[str, float]] = {
-        each.effect: dict(each.model_extra or {}) for each in scene.model.effects
+        each.effect: dict(each.values) for each in scene.model.effects
     }
     found: dict[tuple[str, str], float] = {}
     for cause in _told_apart(verdict):
+        values = adopted.setdefault(cause.effect, {})
         for name, estimate in cause.parameters.items():
             known = found.setdefault((cause.effect, name), estimate.value)
             if known != estimate.value:
@@ -42,7 +43,7 @@ def adopted_effects(scene: Scene, verdict: Verdict) -> list[dict[str, Any]]:
                     f"{cause.effect} cannot be adopted with {name} of both {known:g} and "
                     f"{estimate.value:g}: an effect is in a model once"
                 )
-            adopted.setdefault(cause.effect, {})[name] = float(f"{estimate.value:.6g}")
+            values[name] = float(f"{estimate.value:.6g}")
     return [{"effect": effect, **values} for effect, values in adopted.items()]
 
 

@@ -102,7 +102,8 @@ def verdict_sentence(verdict: Verdict, effects: Mapping[str, Effect]) -> str:
             "The simulation differs from what was measured, and these data cannot tell why: "
             f"{either([key_words(key) for key in verdict.ambiguous])}."
         )
-    return f"{_named(verdict, effects)} {_gain_words(verdict)}"
+    these = "These are" if len(verdict.causes) > 1 else "This is"
+    return f"{these} missing from the simulation: {_named(verdict, effects)} {_gain_words(verdict)}"
 
 
 def either(names: Sequence[str]) -> str:
@@ -116,13 +117,20 @@ def joined(names: Sequence[str], last: str = "and") -> str:
 
 
 def _named(verdict: Verdict, effects: Mapping[str, Effect]) -> str:
-    sentences = []
-    for cause in verdict.causes:
-        effect = effects.get(cause.effect)
-        meaning = f" {effect.sentence.rstrip('.')}." if effect is not None else ""
-        told = cause_words(cause)
-        sentences.append(f"{told[0].upper()}{told[1:]}.{meaning}")
-    return " ".join(sentences)
+    """What each named effect means, with its values; the intervals stand elsewhere."""
+    told = "; ".join(_cause_sentence(cause, effects) for cause in verdict.causes)
+    return f"{told}." if told else ""
+
+
+def _cause_sentence(cause: Cause, effects: Mapping[str, Effect]) -> str:
+    name = key_words(f"{cause.effect}@{cause.site}" if cause.site else cause.effect)
+    values = [f"{spoken(p)} {quantity(e.value, e.unit)}" for p, e in cause.parameters.items()]
+    told = f"{name}: {', '.join(values)}" if values else name
+    effect = effects.get(cause.effect)
+    if effect is None:
+        return told
+    meaning = effect.sentence.rstrip(".")
+    return f"{meaning[0].lower()}{meaning[1:]} ({told})"
 
 
 def _gain_words(verdict: Verdict) -> str:

@@ -20,7 +20,7 @@ _MM = 1000.0
 def log_scene(stream: rr.RecordingStream, info: RunInfo) -> None:
     """Bed, region, holes, cameras; in 3-D and on the map seen from above."""
     scene = info.scene
-    _log_bed_and_region(stream, scene)
+    log_bed_and_region(stream, scene)
     _log_camera(stream, "endoscope", scene.endoscope)
     _log_camera(stream, "depth_camera", scene.depth_camera)
     if info.actual is not None:
@@ -53,7 +53,8 @@ def log_believed(stream: rr.RecordingStream, scene: Scene, believed: NDArray[np.
     )
 
 
-def _log_bed_and_region(stream: rr.RecordingStream, scene: Scene) -> None:
+def log_bed_and_region(stream: rr.RecordingStream, scene: Scene) -> None:
+    """What lies under the tissue."""
     bed, faces = bed_surface(scene, 0.11, 0.10)
     stream.log("world/bed", _mesh(bed, faces, palette.BED), static=True)
     region, faces = region_surface(scene)

@@ -76,8 +76,8 @@ def test_a_named_cause_is_told_with_its_meaning_and_its_gain() -> None:
     told = verdict_sentence(
         verdict("named", causes=(cause,), gain=Gain(in_range=0.83)), {relaxation.name: relaxation}
     )
-    assert told.startswith("Stress relaxation: time 2 s (90 %: 1.5 to 2.5 s).")
-    assert relaxation.sentence in told
+    assert told.startswith("This is missing from the simulation: ")
+    assert f"{relaxation.sentence[1:-1]} (stress relaxation: time 2 s)." in told
     assert "loses 83 % of its error" in told
 
 
@@ -95,7 +95,7 @@ def test_a_set_says_what_cannot_be_told_apart() -> None:
 def test_outside_says_how_much_is_left_and_what_is_known_of_it() -> None:
     told = verdict_sentence(verdict("outside", causes=(OFFSET,), unexplained_share=0.6), {})
     assert "none of the known causes explains; 60 % of the error stays unexplained" in told
-    assert "Part of it is known: Depth bias: offset 2 mm" in told
+    assert "Part of it is known: depth bias: offset 2 mm." in told
 
 
 def test_nothing_is_said_as_far_as_the_sensors_can_tell() -> None:
