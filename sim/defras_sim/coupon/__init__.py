@@ -1,0 +1,1 @@
+"""A specimen of material that is pulled along one axis."""
