@@ -7,9 +7,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from defras_bt.diagnosis.quality import DataFault, DataQuality, Mask, Sieve
-from defras_bt.diagnosis.quality_checks import backward_rows, pauses_s, unfinite_rows, zero_rows
+from defras_bt.diagnosis.quality_checks import DROP_OUT_PERIODS, backward_rows, unfinite_rows
 from defras_bt.diagnosis.tables import Table
 from defras_sim.geometry import Floats
+
+_USUAL_ZEROS = 0.05
+"""A column that is zero more often than this says nothing by being zero."""
+
+_AROUND = 5
+"""Steps before and after one that say what is usual there."""
 
 
 def rows_in_time(table: Table) -> tuple[Mask, list[DataFault]]:
@@ -21,7 +27,7 @@ def rows_in_time(table: Table) -> tuple[Mask, list[DataFault]]:
     sieve = Sieve(table.name, time_s)
     sieve.leave_out(~np.isfinite(time_s), "not_finite", "time is no number")
     sieve.leave_out(backward_rows(time_s), "time_backwards", "time repeats or runs backwards")
-    gaps = pauses_s(time_s[sieve.kept])
+    gaps = _drop_outs_s(time_s[sieve.kept])
     if gaps:
         longest = max(b - a for a, b in gaps)
         sieve.report(
@@ -42,9 +48,7 @@ def measured_rows(
     sieve = Sieve(f"{table.name} {source}", time_s)
     sieve.kept = among.copy()
     sieve.leave_out(unfinite_rows(values), "not_finite", "not every reading is a number")
-    # Of one column alone a zero may be a reading.
-    if values.shape[1] > 1:
-        sieve.leave_out(zero_rows(values), "zeros", "all readings are exactly zero at once")
+    sieve.leave_out(_zeros_at_once(values), "zeros", "several readings are exactly zero at once")
     return sieve.kept, sieve.faults
 
 
@@ -66,6 +70,32 @@ def suspected_unit(
         f"up to {finite.max():.4g}, more than {limit:.4g}: {suspicion}",
     )
     return True, [fault]
+
+
+def _zeros_at_once(values: Floats) -> Mask:
+    """Rows (n,) in which two or more columns are exactly zero that hardly ever are.
+
+    A camera that saw a part of its markers writes zeros for that part only. Of one column alone a
+    zero may be a reading.
+    """
+    zero = values == 0.0
+    unusual = zero.mean(axis=0) < _USUAL_ZEROS
+    return np.asarray((zero & unusual).sum(axis=1) >= 2, bool)
+
+
+def _drop_outs_s(time_s: Floats) -> list[tuple[float, float]]:
+    """Start and end of every step in time that is long beside those before and after it.
+
+    Rows need not come evenly: many are written where much happens, few in a long hold.
+    """
+    steps = np.diff(time_s)
+    if len(steps) < 3:
+        return []
+    around = np.lib.stride_tricks.sliding_window_view(
+        np.pad(steps, _AROUND, "reflect"), 2 * _AROUND + 1
+    )
+    long = np.flatnonzero(steps > DROP_OUT_PERIODS * np.median(around, axis=1))
+    return [(float(time_s[i]), float(time_s[i + 1])) for i in long]
 
 
 def quality(tables: Sequence[Table], faults: Sequence[DataFault]) -> DataQuality:
