@@ -32,20 +32,21 @@ class Comparison:
 class ReplayFrame:
     """One moment of a recorded retraction beside both models.
 
-    ``cloud_m`` (n, 3) as the camera reported it; ``before_m``, ``after_m`` (n,): signed distance of
-    each point (as each model has it that the camera sees) to the plain and the extended surface,
-    NaN where a point is compared with nothing. ``tips_m`` by arm, each (3,); ``held`` are the arms
-    that hold tissue.
+    ``plain`` and ``extended`` are simulated surfaces, ``plain_cloud_m`` and ``extended_cloud_m``
+    (n, 3) what the camera saw as each model corrects it, ``before_m`` and ``after_m`` (n,) its
+    signed distances to them, positive outside of the tissue. ``tips_m`` by arm, each (3,), as told;
+    ``held`` are the arms that hold tissue.
     """
 
     time_s: float
     trajectory: str
     phase: str
-    cloud_m: Floats
-    before_m: Floats
-    after_m: Floats
     plain: Surface
     extended: Surface
+    plain_cloud_m: Floats
+    extended_cloud_m: Floats
+    before_m: Floats
+    after_m: Floats
     tips_m: Mapping[str, Floats]
     held: tuple[str, ...] = ()
 

@@ -27,18 +27,19 @@ _UNSEEN: palette.Rgb = (196, 200, 205)
 
 def worst_frame(replay: tuple[ReplayFrame, ...]) -> ReplayFrame | None:
     """The frame with the largest 95th percentile of distances to the plain surface."""
-    seen = [frame for frame in replay if np.isfinite(frame.before_m).any()]
+    seen = [frame for frame in replay if len(frame.before_m) and len(frame.after_m)]
     return max(seen, key=lambda f: percentile_m(f.before_m), default=None)
 
 
 def percentile_m(distance_m: Floats) -> float:
-    """95th percentile of the sizes of distances (n,), those not known left out."""
-    return float(np.nanpercentile(np.abs(distance_m), 95))
+    """95th percentile of the sizes of distances (n,)."""
+    return float(np.percentile(np.abs(distance_m), 95))
 
 
 def field_picture(frame: ReplayFrame, scene: Scene, *, extended: bool) -> NDArray[np.uint8]:
     """Simulated surface, coloured by how far what was seen is from it, with the points seen."""
     surface = frame.extended if extended else frame.plain
+    cloud_m = frame.extended_cloud_m if extended else frame.plain_cloud_m
     distance_m = frame.after_m if extended else frame.before_m
     bodies = [
         Body(*bed_surface(scene, 0.16, 0.14), _BED),
@@ -47,8 +48,8 @@ def field_picture(frame: ReplayFrame, scene: Scene, *, extended: bool) -> NDArra
             Body(*disc(place_m, 0.0032, 16), palette.BELIEVED)
             for place_m in scene.holes_m[scene.attached] - [0.0, 0.0, 0.0006]
         ),
-        *_shaded(surface, frame.cloud_m, distance_m, scene.thresholds.delta_m),
-        _points(frame.cloud_m),
+        *_shaded(surface, cloud_m, distance_m, scene.thresholds.delta_m),
+        _points(cloud_m),
     ]
     return render(bodies, field_view())
 
@@ -57,13 +58,12 @@ def _shaded(
     surface: Surface, cloud_m: Floats, distance_m: Floats, delta_m: tuple[float, ...]
 ) -> list[Body]:
     """The surface as one body per shade of colour; grey where nothing was seen near it."""
-    known = np.isfinite(distance_m)
-    tree = cKDTree(cloud_m[known])
+    tree = cKDTree(cloud_m)
     centres_m = surface.vertices_m[surface.triangles].mean(axis=1)
-    count = min(_AVERAGED, int(known.sum()))
+    count = min(_AVERAGED, len(cloud_m))
     gap_m, at = tree.query(centres_m, k=np.arange(1, count + 1), distance_upper_bound=_NEAR_M)
     found = np.isfinite(gap_m)
-    sizes = np.append(np.abs(distance_m[known]), 0.0)[at]
+    sizes = np.append(np.abs(distance_m), 0.0)[at]
     mean_m = (sizes * found).sum(axis=1) / np.maximum(found.sum(axis=1), 1)
     top_m = delta_m[-1]
     shade = np.minimum((mean_m / top_m * _SHADES).astype(int), _SHADES - 1)

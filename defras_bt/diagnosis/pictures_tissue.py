@@ -29,44 +29,79 @@ _ABOVE_BELOW = LinearSegmentedColormap.from_list(
 
 @dataclass(frozen=True)
 class PlacedMeans:
-    """Mean residual per phase and place. ``means_mm`` (phases, places); NaN: nothing was seen."""
+    """Mean residual per phase and place of one ``face`` of the tissue.
 
+    ``means_mm`` (phases, places); NaN: nothing was seen.
+    """
+
+    face: str
     phases: tuple[str, ...]
     places_mm: Floats
     means_mm: Floats
 
 
-def placed_means(samples: Samples, residual: Floats) -> PlacedMeans:
-    """Means over all trajectories, of the channels that have a place and measure lengths."""
-    placed = [i for i, c in enumerate(samples.channels) if c.place_m is not None and c.unit == "m"]
-    phases = [i for i in range(len(samples.phases)) if np.any(samples.phase == i)]
-    means = np.full((len(phases), len(placed)), np.nan)
-    for row, phase in enumerate(phases):
-        for column, channel in enumerate(placed):
-            seen = residual[(samples.channel == channel) & (samples.phase == phase)]
-            seen = seen[np.isfinite(seen)]
-            if len(seen):
-                means[row, column] = _MM * float(seen.mean())
-    shown = np.flatnonzero(np.isfinite(means).any(axis=1))[:_MOST_PHASES]
-    places = np.array([samples.channels[i].place_m for i in placed], float).reshape(-1, 2)
-    names = tuple(samples.phases[phases[i]] for i in shown)
-    return PlacedMeans(names, _MM * places, means[shown])
+def placed_means(samples: Samples, residual: Floats) -> tuple[PlacedMeans, ...]:
+    """Means over all trajectories, of the channels that have a place and measure lengths.
+
+    Channels whose names differ in the last word only ("upper 1,1", "upper 1,2") are of one face.
+    Phases in which nothing was seen of any are left out.
+    """
+    faces: dict[str, list[int]] = {}
+    for i, channel in enumerate(samples.channels):
+        if channel.place_m is not None and channel.unit == "m":
+            faces.setdefault(channel.name.rpartition(" ")[0], []).append(i)
+    tables = {face: _means_mm(samples, residual, members) for face, members in faces.items()}
+    if not tables:
+        return ()
+    seen = np.any([np.isfinite(table).any(axis=1) for table in tables.values()], axis=0)
+    shown = np.flatnonzero(seen)[:_MOST_PHASES]
+    return tuple(
+        PlacedMeans(
+            face,
+            tuple(samples.phases[i] for i in shown),
+            _MM * np.array([samples.channels[i].place_m for i in faces[face]], float),
+            table[shown],
+        )
+        for face, table in tables.items()
+        if np.isfinite(table).any()
+    )
 
 
-def has_places(samples: Samples) -> bool:
+def _means_mm(samples: Samples, residual: Floats, members: list[int]) -> Floats:
+    """Mean (phases, members) of the residual of channels in each phase."""
+    count = len(samples.phases)
+    column = np.full(len(samples.channels), -1)
+    column[members] = np.arange(len(members))
+    chosen = np.isfinite(residual) & (column[samples.channel] >= 0)
+    at = samples.phase[chosen] * len(members) + column[samples.channel[chosen]]
+    size = count * len(members)
+    number = np.bincount(at, minlength=size).astype(float)
+    number[number == 0] = np.nan
+    total = np.bincount(at, residual[chosen], minlength=size)
+    return np.asarray(_MM * total / number).reshape(count, len(members))
+
+
+def has_places(diagnosis: Diagnosis) -> bool:
     """Whether anything can be drawn on a tissue."""
-    return any(c.place_m is not None and c.unit == "m" for c in samples.channels)
+    return bool(placed_means(diagnosis.samples, diagnosis.held_out_before))
 
 
 def tissue_maps_svg(diagnosis: Diagnosis, scene: Scene, *, extended: bool) -> str:
-    """One column per phase; the plain model above and, with ``extended``, that one below."""
-    rows = [("simulation as it was", placed_means(diagnosis.samples, diagnosis.held_out_before))]
-    if extended:
-        rows.append(
-            ("extended simulation", placed_means(diagnosis.samples, diagnosis.held_out_after))
-        )
-    phases = rows[0][1].phases
-    scale_mm = max(_LEAST_SCALE_MM, float(np.nanpercentile(np.abs(rows[0][1].means_mm), 98)))
+    """One column per phase; for each face the plain model and, with ``extended``, that one below.
+
+    Positive where tissue was seen outside of the simulated one.
+    """
+    before = placed_means(diagnosis.samples, diagnosis.held_out_before)
+    after = placed_means(diagnosis.samples, diagnosis.held_out_after)
+    rows = []
+    for index, found in enumerate(before):
+        face = f"{found.face}, " if len(before) > 1 else ""
+        rows.append((f"{face}as it was", found))
+        if extended:
+            rows.append((f"{face}extended", after[index]))
+    phases = before[0].phases
+    everything = np.abs(np.concatenate([found.means_mm.ravel() for found in before]))
+    scale_mm = max(_LEAST_SCALE_MM, float(np.nanpercentile(everything, 98)))
     with matplotlib.rc_context(FIGURE_STYLE):
         figure = Figure(figsize=(1.9 * len(phases) + 1.1, 2.05 * len(rows) + 0.2))
         axes = figure.subplots(
@@ -88,7 +123,7 @@ def tissue_maps_svg(diagnosis: Diagnosis, scene: Scene, *, extended: bool) -> st
             shades = matplotlib.cm.ScalarMappable(norm, _ABOVE_BELOW)
             bar = figure.colorbar(shades, cax=line[-1])
             bar.outline.set_visible(False)
-            bar.set_label("observed lies higher [mm]", fontsize=8)
+            bar.set_label("seen outside (+) [mm]", fontsize=8)
             bar.ax.tick_params(labelsize=8, length=2)
         return svg_text(figure, "Difference between tissue and simulation, seen from above")
 

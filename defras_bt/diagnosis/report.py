@@ -115,7 +115,7 @@ def report_html(
         excess=_excess(diagnosis),
         maps=(
             Markup(tissue_maps_svg(diagnosis, scene, extended=extended))
-            if scene is not None and compared and has_places(diagnosis.samples)
+            if scene is not None and compared and has_places(diagnosis)
             else None
         ),
         panels=_panels(shown, scene, extended=extended) if scene is not None else [],
@@ -241,7 +241,7 @@ def _panels(exhibits: Exhibits, scene: Scene, *, extended: bool) -> list[Panel]:
             png_uri(field_picture(frame, scene, extended=False)),
         )
     ]
-    if extended and np.isfinite(frame.after_m).any():
+    if extended:
         after = quantity(round(percentile_m(frame.after_m), 5), "m")
         panels.append(
             Panel(

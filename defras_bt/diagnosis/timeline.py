@@ -180,10 +180,10 @@ def _log_replay(
     for index, frame in enumerate(replay):
         stream.set_time("time", duration=frame.time_s + starts_s[frame.trajectory])
         _log_surface(stream, "plain", frame.plain, palette.TWIN, topology)
-        _log_points(stream, "observed_plain", frame.cloud_m, frame.before_m, scene)
+        _log_points(stream, "observed_plain", frame.plain_cloud_m, frame.before_m, scene)
         if extended:
             _log_surface(stream, "extended", frame.extended, palette.TWIN, topology)
-            _log_points(stream, "observed_extended", frame.cloud_m, frame.after_m, scene)
+            _log_points(stream, "observed_extended", frame.extended_cloud_m, frame.after_m, scene)
         for arm, tip_m in frame.tips_m.items():
             size_m = 0.0036 if arm in frame.held else 0.0026
             colour = palette.ARMS.get(arm, palette.MUTED)
@@ -217,9 +217,8 @@ def _log_surface(
 def _log_points(
     stream: rr.RecordingStream, name: str, cloud_m: Floats, distance_m: Floats, scene: Scene
 ) -> None:
-    known = np.isfinite(distance_m)
-    colours = palette.discrepancy_colours(np.abs(distance_m[known]), scene.thresholds.delta_m)
-    points = rr.Points3D(cloud_m[known].astype(np.float32), colors=colours, radii=0.0009)
+    colours = palette.discrepancy_colours(np.abs(distance_m), scene.thresholds.delta_m)
+    points = rr.Points3D(cloud_m.astype(np.float32), colors=colours, radii=0.0009)
     stream.log(f"world/tissue/{name}", points)
 
 
