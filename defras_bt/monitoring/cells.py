@@ -119,6 +119,26 @@ def ring_ranges(
 
 
 @jit
+def neighbour_ranges(cells: Cells, cube: int, ranges: NDArray[np.int64]) -> int:
+    """Write ranges of the points in cube number ``cube`` and those around it; return how many.
+
+    There are at most 9 of them, one for each column of cubes that holds any point.
+    """
+    nx, ny, nz = cells.shape[0], cells.shape[1], cells.shape[2]
+    x, y, z = cube // (ny * nz), cube // nz % ny, cube % nz
+    count = 0
+    for column_x in range(max(x - 1, 0), min(x + 2, nx)):
+        for column_y in range(max(y - 1, 0), min(y + 2, ny)):
+            column = (column_x * ny + column_y) * nz
+            start = cells.first[column + max(z - 1, 0)]
+            end = cells.first[column + min(z + 2, nz)]
+            if start < end:
+                ranges[count, 0], ranges[count, 1] = start, end
+                count += 1
+    return count
+
+
+@jit
 def range_buffer(cells: Cells) -> NDArray[np.int64]:
     """Room for what :func:`ring_ranges` writes."""
     return np.empty((2 * cells.shape[0] * cells.shape[1], 2), np.int64)

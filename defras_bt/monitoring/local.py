@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defras_bt.monitoring.closest import closest_on_triangles
+from defras_bt.monitoring.closest import distance_to_triangles_m
 from defras_bt.monitoring.metric import Measurement
 from defras_bt.monitoring.neighbours import worst_median
 from defras_bt.monitoring.seen import SeenSurface
@@ -36,7 +36,7 @@ class LocalMetric:
     def measure(self, cloud_m: Floats, seen: SeenSurface) -> Measurement:
         if len(cloud_m) < self.min_neighbours or len(seen.corners_m) == 0:
             return Measurement(float("nan"), np.full(len(cloud_m), np.nan))
-        distance = closest_on_triangles(cloud_m, seen.corners_m).distance_m
+        distance = distance_to_triangles_m(cloud_m, seen.corners_m)
         worst, known = worst_median(
             np.ascontiguousarray(cloud_m),
             distance,

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from defras_bt.monitoring.cells import (
+    extent_m,
     home,
     last_ring,
+    neighbour_ranges,
     range_buffer,
     ring_m,
     ring_ranges,
@@ -49,39 +52,94 @@ def worst_median(
     Neighbours are less than ``radius_m`` away; each point is its own. Of more than ``most`` of them
     the nearest count; a point with fewer than ``least`` does not count. NaN if none does.
     """
-    cells = sorted_into_cells(points_m, radius_m)
-    ranges, count = range_buffer(cells), len(points_m)
-    square, value = np.empty(count), np.empty(count)
-    ordered, reach = values[cells.order], radius_m * radius_m
+    cells = sorted_into_cells(_longest_last(points_m), radius_m)
+    places, value = cells.points_m.T.copy(), values[cells.order]
+    buffer, ranges = np.empty((2, len(value))), np.empty((9, 2), np.int64)
+    # Where the largest value is, a large median is likely: few others can compete with that.
+    likely = np.argmax(value)
     worst, known = -np.inf, 0
-    for at in range(count):
-        x, y, z = cells.points_m[at, 0], cells.points_m[at, 1], cells.points_m[at, 2]
-        cube, _, _ = home(cells, cells.points_m[at])
-        found = 0
-        # A ring is as wide as the radius or wider, so none but the first can hold a neighbour.
-        for ring in range(2):
-            for r in range(ring_ranges(cells, cube, ring, ranges)):
-                for other in range(ranges[r, 0], ranges[r, 1]):
-                    u = cells.points_m[other, 0] - x
-                    v = cells.points_m[other, 1] - y
-                    w = cells.points_m[other, 2] - z
-                    # Written always and kept if near: processors guess badly which are.
-                    apart = u * u + v * v + w * w
-                    square[found], value[found] = apart, ordered[other]
-                    found += int(apart < reach)
-        if found < least:
-            continue
-        known += 1
-        if found > most:
-            _nearest_first(square, value, found, most)
-            found = most
-        above = 0
-        for i in range(found):
-            above += value[i] > worst
-        # A median is above what half of its values are above.
-        if above >= found - found // 2:
-            worst = max(worst, _median(value, found))
+    for everywhere in (False, True):
+        for cube in range(len(cells.first) - 1):
+            start, end = cells.first[cube], cells.first[cube + 1]
+            if start == end or not (everywhere or start <= likely < end):
+                continue
+            columns = ranges[: neighbour_ranges(cells, cube, ranges)]
+            for i in range(start, end):
+                if not (everywhere or i == likely):
+                    continue
+                found, above = _counts(places, value, i, columns, radius_m, worst)
+                if found < least:
+                    continue
+                known += int(everywhere)
+                # A median is above what half of its values are above.
+                if 2 * above >= min(found, most):
+                    median = _median_at(places, value, i, columns, radius_m, most, buffer)
+                    worst = max(worst, median)
     return worst if known > 0 else np.nan, known
+
+
+@jit
+def _longest_last(points_m: Floats) -> Floats:
+    """The same points (n, 3) with axes exchanged: the last is that along which they reach farthest.
+
+    Columns of cubes are then few and full.
+    """
+    low, high = extent_m(points_m)
+    axes, turned = np.argsort(high - low), np.empty(points_m.shape)
+    for i in range(len(points_m)):
+        for k in range(3):
+            turned[i, k] = points_m[i, axes[k]]
+    return turned
+
+
+@jit
+def _counts(
+    places: Floats, value: Floats, i: int, ranges: NDArray[np.int64], radius_m: float, limit: float
+) -> tuple[int, int]:
+    """How many neighbours point ``i`` of ``places`` (3, n) has, and of how many values > ``limit``.
+
+    Counted in numbers that several fit into one register, over slices that compilers know the ends
+    of: so it is done four at a time.
+    """
+    found = above = 0.0
+    px, py, pz, reach = places[0, i], places[1, i], places[2, i], radius_m * radius_m
+    for r in range(len(ranges)):
+        start, end = ranges[r, 0], ranges[r, 1]
+        x, y, z = places[0, start:end], places[1, start:end], places[2, start:end]
+        values = value[start:end]
+        for j in range(len(x)):
+            u, v, w = x[j] - px, y[j] - py, z[j] - pz
+            near = 1.0 if u * u + v * v + w * w < reach else 0.0
+            found += near
+            above += near if values[j] > limit else 0.0
+    return int(found), int(above)
+
+
+@jit
+def _median_at(
+    places: Floats,
+    value: Floats,
+    i: int,
+    ranges: NDArray[np.int64],
+    radius_m: float,
+    most: int,
+    buffer: Floats,
+) -> float:
+    """Median over the neighbourhood of point ``i``; ``buffer`` (2, n) is written to."""
+    square, values, found = buffer[0], buffer[1], 0
+    for r in range(len(ranges)):
+        for j in range(ranges[r, 0], ranges[r, 1]):
+            u = places[0, j] - places[0, i]
+            v = places[1, j] - places[1, i]
+            w = places[2, j] - places[2, i]
+            apart = u * u + v * v + w * w
+            if apart < radius_m * radius_m:
+                square[found], values[found] = apart, value[j]
+                found += 1
+    if found > most:
+        _nearest_first(square, values, found, most)
+        found = most
+    return _median(values, found)
 
 
 @jit

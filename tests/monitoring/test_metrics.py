@@ -74,7 +74,7 @@ def test_a_common_translation_changes_no_value(
     seen = seen_surface(slab(), scene.depth_camera)
     cloud = take_cloud(slab(bump(0.01)), 3)
     shift = np.array([0.3, -0.2, 0.1])
-    moved = SeenSurface(seen.triangles, seen.corners_m + shift, seen.samples_m + shift)
+    moved = SeenSurface(seen.triangles, seen.corners_m + shift, lambda: seen.samples_m + shift)
     expected = metric.measure(cloud, seen).value_m
     assert metric.measure(cloud + shift, moved).value_m == pytest.approx(expected, abs=1e-9)
 
@@ -96,7 +96,7 @@ def test_nothing_to_compare_is_nan(
 ) -> None:
     seen = seen_surface(slab(), scene.depth_camera)
     assert np.isnan(metric.measure(np.zeros((0, 3)), seen).value_m)
-    empty = SeenSurface(np.zeros(0, np.int64), np.zeros((0, 3, 3)), np.zeros((0, 3)))
+    empty = SeenSurface(np.zeros(0, np.int64), np.zeros((0, 3, 3)), lambda: np.zeros((0, 3)))
     assert np.isnan(metric.measure(take_cloud(slab(), 0), empty).value_m)
 
 

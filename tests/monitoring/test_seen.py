@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from defras_bt.monitoring.hidden import facing_triangles, seen_places, touched_vertices
 from defras_bt.monitoring.seen import SeenSurface, seen_surface
-from defras_sim.camera.pinhole import in_picture
+from defras_sim.camera.pinhole import in_picture, intrinsics, tissue_from_camera
 from defras_sim.geometry import Floats
 from defras_sim.scene import Camera, Scene
 from defras_sim.surface import Surface
 from tests.monitoring.shapes import Deform, folded, wavy
 
-PLACES = np.array([[0.7, 0.15, 0.15], [0.15, 0.7, 0.15], [0.15, 0.15, 0.7], [1 / 3, 1 / 3, 1 / 3]])
+PLACES = np.array([[1 / 3, 1 / 3, 1 / 3], [0.7, 0.15, 0.15], [0.15, 0.7, 0.15], [0.15, 0.15, 0.7]])
 
 
 def hits_before(eye_m: Floats, place_m: Floats, corners_m: Floats) -> NDArray[np.bool_]:
@@ -46,7 +47,7 @@ def ray_traced(surface: Surface, camera: Camera) -> SeenSurface:
     touched = np.zeros(len(surface.vertices_m), bool)
     touched[surface.triangles[facing[seen.reshape(-1, 4).any(axis=1)]]] = True
     chosen = facing[touched[surface.triangles[facing]].any(axis=1)]
-    return SeenSurface(chosen, corners[chosen], samples[seen])
+    return SeenSurface(chosen, corners[chosen], lambda: samples[seen])
 
 
 def placed(stretch: float, shift_m: tuple[float, float, float]) -> Deform:
@@ -76,6 +77,21 @@ def test_what_is_seen_is_what_rays_reach(
     np.testing.assert_array_equal(found.triangles, expected.triangles)
     np.testing.assert_array_equal(found.corners_m, expected.corners_m)
     np.testing.assert_allclose(found.samples_m, expected.samples_m, atol=1e-15)
+
+
+@pytest.mark.parametrize("deform", [folded(), placed(1.0, (0.17, 0.0, 0.19)), wavy(3, 0.04)])
+def test_vertices_are_touched_where_any_place_beside_them_is_seen(
+    deform: Deform, slab: Callable[..., Surface], scene: Scene
+) -> None:
+    surface, camera = slab(deform), scene.depth_camera
+    pose, size_px = tissue_from_camera(camera), np.array([camera.width_px, camera.height_px], float)
+    in_camera = (surface.vertices_m - pose.position_m) @ pose.rotation
+    triangles = surface.triangles[facing_triangles(in_camera, surface.triangles)]
+    looked_at = in_camera, triangles, PLACES, intrinsics(camera), size_px
+    expected = np.zeros(len(in_camera), bool)
+    expected[triangles[seen_places(*looked_at).any(axis=1)]] = True
+    assert 0 < np.count_nonzero(expected) < len(in_camera)
+    np.testing.assert_array_equal(touched_vertices(*looked_at), expected)
 
 
 def test_the_lower_face_of_a_resting_slab_is_never_seen(
