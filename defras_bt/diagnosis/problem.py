@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,4 +117,24 @@ class Problem(Protocol):
         """How predictions change if ``candidate`` is added to (or, where ``model`` has it, moved
         in) ``model``: one where the null point has a derivative, several secants where it has
         none."""
+        ...
+
+
+@runtime_checkable
+class Remarking(Protocol):
+    """A problem that knows what its data say beside any effect."""
+
+    def remarks(self, model: Extension) -> Sequence[str]:
+        """Sentences a reader of the verdict should know of what ``model`` cannot follow."""
+        ...
+
+
+@runtime_checkable
+class Extrapolating(Protocol):
+    """A problem whose data reach far enough that what is said beyond a range can be scored."""
+
+    def split_by_range(self) -> tuple[Problem, Problem, str] | None:
+        """Where little was asked of the model (to fit) and where more was (to score), with the
+        same candidates, and in words where the line is drawn ("a stretch of 4.1"); None where the
+        data do not reach far enough."""
         ...
