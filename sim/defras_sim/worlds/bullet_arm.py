@@ -8,9 +8,12 @@ import numpy as np
 
 from defras_sim.arm.dh import JOINT_SPEED
 from defras_sim.arm.kinematics import Unreachable, joints_for, tip_pose
+from defras_sim.effects.arm_layer import ArmLayer
+from defras_sim.effects.grasp_layer import GraspLayer
 from defras_sim.geometry import Floats, Pose
 from defras_sim.resources import resource
 from defras_sim.worlds.error import WorldError
+from defras_sim.worlds.force_sensor import NO_FORCE
 from defras_sim.worlds.kinematic_tool import JAW_ON_TISSUE_RAD, JAW_SPEED_RAD_S
 from defras_sim.worlds.protocol import JAW_CLOSED_RAD, ArmCommand, ArmObservation
 
@@ -28,56 +31,71 @@ NATURAL_ROTATION = tip_pose(np.zeros(6)).rotation
 class BulletArm:
     """One arm, its jaw, and the body that carries what the jaw holds.
 
-    The carried tissue hangs on a small body fixed to the measured tip by a constraint, because a
-    constraint tells its force and a link of the arm does not.
+    The motors go where the effects on the arm make of the set-point. The carried tissue hangs on a
+    small body fixed to the tip by a constraint, because a constraint tells its force and a link of
+    the arm does not; effects on the grasp say where on the tip.
     """
 
-    def __init__(self, client: Any, name: str, rcm_m: Floats, home_tip_m: Floats) -> None:
+    def __init__(
+        self, client: Any, name: str, rcm_m: Floats, home_tip_m: Floats, layer: ArmLayer
+    ) -> None:
         self._client = client
         self.name = name
         self._rcm_m = np.asarray(rcm_m, float)
+        self._layer = layer
+        self._time_s = 0.0
         self._body = client.loadURDF(
             str(resource("sim/robots/psm.urdf")), list(self._rcm_m), useFixedBase=True
         )
         self.setpoint = Pose(np.asarray(home_tip_m, float), NATURAL_ROTATION)
         self.setpoint_joints = self._solve(self.setpoint, _START)
+        self._layer.follow(0.0, self.setpoint)
+        self._target = self._layer.tip(NO_FORCE)
+        self._target_joints = self._aimed(self.setpoint_joints)
         self.jaw_rad = JAW_CLOSED_RAD
         self._jaw_goal_rad = JAW_CLOSED_RAD
         for joint in _JOINTS:
-            client.resetJointState(self._body, joint, self.setpoint_joints[joint])
+            client.resetJointState(self._body, joint, self._target_joints[joint])
         self._show_jaw()
         self.grip = client.createMultiBody(_GRIP_MASS_KG, -1, -1, list(home_tip_m))
         self._fixed = client.createConstraint(
             self.grip, -1, -1, -1, client.JOINT_FIXED, [0, 0, 0], [0, 0, 0], list(home_tip_m)
         )
         self.anchors: list[int] = []
+        self.held: GraspLayer | None = None
         self.armed = False
 
-    def begin_tick(self, command: ArmCommand, tick_s: float) -> None:
+    def begin_tick(self, command: ArmCommand, tick_s: float, end_s: float) -> None:
         """Take the set-points to the end of the tick; they are approached over its sub-steps.
+
+        ``end_s``: world time of that end.
 
         Raises:
             WorldError: the arm cannot go there.
         """
-        self._from_joints = self.setpoint_joints
+        self._time_s = end_s
+        before, target_before = self.setpoint_joints, self._target_joints
         linear, angular = command.linear_m_s * tick_s, command.angular_rad_s * tick_s
         if np.any(linear) or np.any(angular):
             self.setpoint = self.setpoint.moved(linear, angular)
             self.setpoint_joints = self._solve(self.setpoint, self.setpoint_joints)
-        speed = np.abs(self.setpoint_joints - self._from_joints) / tick_s
+        speed = np.abs(self.setpoint_joints - before) / tick_s
         if np.any(speed > JOINT_SPEED):
             raise WorldError(
                 f"{self.name}: joint speeds {np.round(speed, 2)} exceed the limits "
                 f"{np.round(JOINT_SPEED, 2)}; command the tip slower"
             )
-        self._joint_speed = (self.setpoint_joints - self._from_joints) / tick_s
+        self._layer.follow(end_s, self.setpoint)
+        self._target = self._layer.tip(-self.force_on_tissue_n())
+        self._from_joints, self._target_joints = target_before, self._aimed(target_before)
+        self._joint_speed = (self._target_joints - target_before) / tick_s
         if command.jaw_rad is not None:
             self._jaw_goal_rad = command.jaw_rad
         self._move_jaw(JAW_SPEED_RAD_S * tick_s)
 
     def drive(self, share: float) -> None:
         """Set motors and grip for the sub-step that ends at ``share`` (0..1) of the tick."""
-        wanted = self._from_joints + share * (self.setpoint_joints - self._from_joints)
+        wanted = self._from_joints + share * (self._target_joints - self._from_joints)
         self._client.setJointMotorControlArray(
             self._body,
             list(_JOINTS),
@@ -89,50 +107,74 @@ class BulletArm:
             forces=_JOINT_FORCES,
         )
         if self.anchors:
-            tip = self.measured()
+            jaw = self._jaw()
             self._client.changeConstraint(
                 self._fixed,
-                list(tip.position_m),
-                list(_relative(tip).quaternion_xyzw),
+                list(jaw.position_m),
+                list(_relative(jaw).quaternion_xyzw),
                 maxForce=_GRIP_FORCE_N,
             )
 
-    def measured_joints(self) -> Floats:
+    def joints(self) -> Floats:
+        """Where the joints truly are (6,)."""
         states = self._client.getJointStates(self._body, list(_JOINTS))
         return np.array([state[0] for state in states])
 
-    def measured(self) -> Pose:
-        """tissue_from_tip from the measured joints."""
-        return self._to_tissue(tip_pose(self.measured_joints()))
+    def tip(self) -> Pose:
+        """tissue_from_tip: where the tip truly is."""
+        return self._to_tissue(tip_pose(self.joints()))
 
     def carry(self) -> Pose:
-        """Bring the carrying body to the tip, ready to be anchored to; returns its pose."""
-        tip = self.measured()
-        turn = _relative(tip).quaternion_xyzw
-        self._client.resetBasePositionAndOrientation(self.grip, list(tip.position_m), list(turn))
+        """Bring the carrying body to where the jaw holds, ready to be anchored to; its pose."""
+        jaw = self._jaw()
+        turn = _relative(jaw).quaternion_xyzw
+        self._client.resetBasePositionAndOrientation(self.grip, list(jaw.position_m), list(turn))
         self._client.changeConstraint(
-            self._fixed, list(tip.position_m), list(turn), maxForce=_GRIP_FORCE_N
+            self._fixed, list(jaw.position_m), list(turn), maxForce=_GRIP_FORCE_N
         )
-        return Pose(tip.position_m, _relative(tip).rotation)
+        return Pose(jaw.position_m, _relative(jaw).rotation)
 
-    def force_n(self) -> float:
-        """True force (N) on what the jaw holds, 0 without a grip."""
+    def force_on_tissue_n(self) -> Floats:
+        """True force (3,) of the jaw on the tissue, along the tissue frame; 0 without a grip."""
         if not self.anchors:
-            return 0.0
-        return float(np.linalg.norm(self._client.getConstraintState(self._fixed)[:3]))
+            return NO_FORCE
+        return np.array(self._client.getConstraintState(self._fixed)[:3])
 
-    def observe(self, time_s: float) -> ArmObservation:
-        joints = self.measured_joints()
+    def observe(self, time_s: float, force_n: Floats | None) -> ArmObservation:
+        """``force_n`` (3,): what a force sensor says; None without one."""
+        joints, tip = self._encoded()
         return ArmObservation(
             stamp_s=time_s,
-            tissue_from_tip=self._to_tissue(tip_pose(joints)),
+            tissue_from_tip=tip,
             setpoint_tissue_from_tip=self.setpoint,
             jaw_rad=self.jaw_rad,
             # A jaw that was told to close and stands open has something between its ends.
             grasped=self._jaw_goal_rad < JAW_ON_TISSUE_RAD <= self.jaw_rad and bool(self.anchors),
             joints=joints,
             setpoint_joints=self.setpoint_joints,
+            force_n=force_n,
         )
+
+    def _encoded(self) -> tuple[Floats, Pose]:
+        """Joints (6,) and tissue_from_tip as the encoders have them."""
+        joints = self.joints()
+        tip = self._to_tissue(tip_pose(joints))
+        if self._layer.is_plain:
+            return joints, tip
+        # Motors miss their goal by a little; encoders see that, and not what is behind them.
+        seen = self._layer.measured() @ (self._target.inverse() @ tip)
+        return self._solve(seen, joints), seen
+
+    def _aimed(self, start: Floats) -> Floats:
+        """Joints (6,) at which the motors aim."""
+        if self._layer.is_plain:
+            return self.setpoint_joints
+        return self._solve(self._target, start)
+
+    def _jaw(self) -> Pose:
+        """tissue_from_jaw: where the jaw truly holds what it holds."""
+        tip = self.tip()
+        return tip if self.held is None else self.held.held(self._time_s, tip)
 
     def _move_jaw(self, most_rad: float) -> None:
         turned = self.jaw_rad + np.clip(self._jaw_goal_rad - self.jaw_rad, -most_rad, most_rad)

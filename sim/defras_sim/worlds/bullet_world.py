@@ -1,6 +1,7 @@
 """BulletWorld: PyBullet's deformable tissue, two jointed arms, and rendered cameras.
 
-Nothing is handed over that a real set-up would not have: pictures, joints and jaws.
+Nothing is handed over that a real set-up would not have: pictures, joints, jaws, and forces where
+there are sensors.
 """
 
 from __future__ import annotations
@@ -10,21 +11,29 @@ from typing import Any
 
 import numpy as np
 
+from defras_sim.effects.arm_layer import ArmLayer
+from defras_sim.effects.camera_layer import CameraLayer
+from defras_sim.effects.grasp_layer import GraspLayer
+from defras_sim.effects.layers import Layers
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
 from defras_sim.worlds.bullet_arm import BulletArm
 from defras_sim.worlds.bullet_camera import take_picture
+from defras_sim.worlds.bullet_effects import in_bullet
 from defras_sim.worlds.bullet_tissue import CONTACT_MARGIN_M, BulletTissue
 from defras_sim.worlds.clock import TickClock
 from defras_sim.worlds.colours import BED, ROI
 from defras_sim.worlds.error import WorldError
+from defras_sim.worlds.force_sensor import measured_force_n
 from defras_sim.worlds.jaw_contact import meets_tissue
 from defras_sim.worlds.kinematic_tool import ARMED_ABOVE_RAD, JAW_ON_TISSUE_RAD
+from defras_sim.worlds.late import LateReadings
 from defras_sim.worlds.native_output import STDERR, without_native_output
 from defras_sim.worlds.protocol import (
     HOLD,
     ArmCommand,
     ArmObservation,
+    CameraImage,
     Command,
     Observation,
 )
@@ -46,9 +55,18 @@ class BulletWorld:
     name = "bullet"
 
     def __init__(self, scene: Scene, rng: np.random.Generator) -> None:
-        """``scene`` is the actual one. ``rng`` makes the depth camera's noise."""
+        """``scene`` is the actual one. ``rng`` makes the sensors' noise.
+
+        Raises:
+            ValueError: the scene adopts an effect that PyBullet cannot imitate.
+        """
+        layers = Layers.of(scene.model.extension)
+        scene = in_bullet(scene, layers)
         self.tick_s = scene.tick_s
         self._scene = scene
+        self._grasp_effects = layers.grasp
+        self._camera = CameraLayer(scene.depth_camera, layers.camera)
+        self._pictures = LateReadings[CameraImage](layers.delay_s, _restamped)
         self._rng = rng
         self._clock = TickClock(scene.tick_s)
         self._steps = max(1, round(scene.tick_s / scene.simulation.bullet_step_s))
@@ -61,7 +79,13 @@ class BulletWorld:
             self._lay_bed()
             self._tissue = BulletTissue(self._client, scene)
             self._arms = {
-                name: BulletArm(self._client, name, np.array(arm.rcm_m), np.array(arm.home_tip_m))
+                name: BulletArm(
+                    self._client,
+                    name,
+                    np.array(arm.rcm_m),
+                    np.array(arm.home_tip_m),
+                    ArmLayer(np.array(arm.rcm_m), layers.arm),
+                )
                 for name, arm in scene.arms.items()
             }
             if scene.tissue.gravity_m_s2 > 0:
@@ -93,7 +117,7 @@ class BulletWorld:
         """
         self._clock.tick()
         for name, arm in self._arms.items():
-            arm.begin_tick(self._command.arms.get(name, ArmCommand()), self.tick_s)
+            arm.begin_tick(self._command.arms.get(name, ArmCommand()), self.tick_s, self.time_s)
             self._update_grip(arm)
         self._command = HOLD
         for number in range(1, self._steps + 1):
@@ -104,7 +128,7 @@ class BulletWorld:
         self._sense()
 
     def true_force_n(self) -> float:
-        return max(arm.force_n() for arm in self._arms.values())
+        return max(float(np.linalg.norm(a.force_on_tissue_n())) for a in self._arms.values())
 
     def true_surface(self) -> Surface:
         return self._tissue.surface()
@@ -120,12 +144,14 @@ class BulletWorld:
             arm.armed = True
         if arm.anchors and arm.jaw_rad > JAW_ON_TISSUE_RAD + 1e-9:
             self._tissue.let_go(arm.anchors)
-            arm.anchors = []
+            arm.anchors, arm.held = [], None
         elif arm.armed and not arm.anchors and arm.jaw_rad <= JAW_ON_TISSUE_RAD:
             arm.armed = False
-            tip_m = arm.measured().position_m
-            if meets_tissue(self._tissue.surface(), tip_m):
-                nodes = self._tissue.patch_at(tip_m)
+            held = GraspLayer(self._grasp_effects, self.time_s, arm.tip())
+            jaw_m = held.taken.position_m
+            if meets_tissue(self._tissue.surface(), jaw_m):
+                nodes = self._tissue.patch_at(jaw_m)
+                arm.held = held
                 arm.anchors = self._tissue.grip(arm.grip, arm.carry(), nodes)
                 arm.jaw_rad = JAW_ON_TISSUE_RAD
 
@@ -149,12 +175,21 @@ class BulletWorld:
         """Read every sensor that is due; the others keep their last reading."""
         scene, time_s = self._scene, self.time_s
         arms: dict[str, ArmObservation] = {
-            name: arm.observe(time_s) for name, arm in self._arms.items()
+            name: self._arms[name].observe(
+                time_s,
+                measured_force_n(
+                    part.force_noise_sd_n, self._arms[name].force_on_tissue_n(), self._rng
+                ),
+            )
+            for name, part in scene.arms.items()
         }
         update = replace(self._latest, time_s=time_s, arms=arms)
         if self._clock.due(scene.depth_camera.period_s):
             picture = take_picture(self._client, scene.depth_camera, time_s, self._rng)
-            update = replace(update, depth_image=picture)
+            self._pictures.add(time_s, self._camera.reported_image(picture))
+        arrived = self._pictures.arrived(time_s)
+        if arrived is not None:
+            update = replace(update, depth_image=arrived)
         if self._clock.due(scene.endoscope.period_s):
             picture = take_picture(self._client, scene.endoscope, time_s, None)
             update = replace(update, endoscope_image=picture)
@@ -178,3 +213,7 @@ class BulletWorld:
             rgbaColor=[*ROI, 1],
         )
         client.createMultiBody(0, -1, region, list(scene.roi_center_m))
+
+
+def _restamped(image: CameraImage, stamp_s: float) -> CameraImage:
+    return replace(image, stamp_s=stamp_s)
