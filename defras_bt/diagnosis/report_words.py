@@ -19,8 +19,9 @@ _SCALED: dict[str, tuple[float, str]] = {
     "rad": (math.degrees(1.0), "°"),
     "m/N": (1e3, "mm/N"),
     "rad/N": (math.degrees(1.0), "°/N"),
-    "kPa": (1.0, "kPa"),
+    "m/s^2": (1.0, "m/s²"),
 }
+_PURE = ("", "1", "rad/rad", "m/m")
 _DIGITS = 3
 
 
@@ -41,7 +42,7 @@ def quantity(value: float, unit: str) -> str:
 
 def unit_shown(unit: str) -> tuple[float, str]:
     """Factor and name of the unit in which people read values given in ``unit``."""
-    return _SCALED.get(unit, (1.0, "" if unit in ("", "1") else unit))
+    return _SCALED.get(unit, (1.0, "" if unit in _PURE else unit))
 
 
 def estimate_words(estimate: Estimate) -> str:
