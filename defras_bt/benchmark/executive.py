@@ -164,6 +164,7 @@ class _Rig:
         self._executive = Executive(
             tree_file, context, world, perception, self._recorder, max_time_s=600.0
         )
+        monitor.listen_to(self._executive.tree.metric)
         self._board = bench.board
         self._recorder.start(_info(scene, self._executive))
 

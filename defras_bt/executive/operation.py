@@ -157,6 +157,7 @@ def operate_in(
             substitutes=operation.substitutes,
             operator=operator,
         )
+        monitor.listen_to(executive.tree.metric)
         breaker = injected.breaker()
         if breaker is not None:
             executive.watch(breaker)

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from defras_bt.faults.fault import Fault, Injector
-from defras_bt.monitoring.warning import CONFIRMING_FRAMES
+from defras_bt.monitoring.metric_track import CONFIRMING_FRAMES
 from defras_bt.sensing.sense import MIN_CLOUD_POINTS
 from defras_sim.camera.pinhole import tissue_from_camera
 from defras_sim.geometry import Floats, Pose

@@ -15,8 +15,9 @@ class MonitorReading:
     """Discrepancy between the observed cloud and the twin's surface.
 
     ``mu_m`` per metric ("local", "median"), with the rest value subtracted, never below 0; NaN
-    while it cannot be said. ``warning_state`` per metric, 0..3. ``per_point_m`` (n,) is the local
-    metric's distance at each cloud point, for pictures.
+    while it cannot be said. ``warning_state`` per metric, 0..3. Both are of the cloud stamped
+    ``stamp_s``, those of a metric that could wait maybe of a cloud before it. ``per_point_m`` (n,)
+    is the local metric's distance at each cloud point, for pictures.
     """
 
     stamp_s: float

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from defras_bt.monitoring.local import LocalMetric
 from defras_bt.monitoring.median import MedianMetric
 from defras_bt.monitoring.metric import Metric
+from defras_bt.monitoring.metric_track import MetricTrack
 from defras_bt.monitoring.reading import MonitorReading
-from defras_bt.monitoring.rest import MIN_REST_FRAMES, RestCalibration, calibrate_rest
+from defras_bt.monitoring.rest import RestCalibration
 from defras_bt.monitoring.seen import SeenSurface, seen_surface
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
 from defras_sim.worlds.protocol import PointCloud
 
-# A state is believed when this many camera frames in a row reach it: noise of one frame neither
-# stops a motion nor teaches the twin. Costs one camera period, 1.5 mm at the speed with tissue.
-CONFIRMING_FRAMES = 2
-_MAX_REST_FRAMES = 100
 # Released tissue swings back while the quasi-static twin is at rest at once.
 SETTLING_S = 5.0
+# Where every tick brings a new cloud, metrics that can wait are measured this often.
+WAITING_S = 1.0
 _HISTORY_S = 1.0
 
 
@@ -36,19 +35,31 @@ class WarningMonitor:
     def __init__(self, scene: Scene, metrics: Sequence[Metric] | None = None) -> None:
         self._scene = scene
         self._metrics: tuple[Metric, ...] = tuple(metrics or (LocalMetric(), MedianMetric()))
-        self._rest: dict[str, list[float]] = {metric.name: [] for metric in self._metrics}
+        self._tracks = {
+            metric.name: MetricTrack(scene.thresholds.delta_m) for metric in self._metrics
+        }
+        self._can_wait: Collection[str] = ()
+        self._waiting: tuple[PointCloud, SeenSurface] | None = None
+        self._caught_up_s = -np.inf
         self._rest_stamp_s = -np.inf
-        self._calibration: dict[str, RestCalibration] = {}
         self._surfaces: deque[tuple[float, Surface]] = deque()
-        self._raw_states: deque[Mapping[str, int]] = deque(maxlen=CONFIRMING_FRAMES)
         self._last: MonitorReading | None = None
-        self._settling_until_s = -np.inf
         self._seen: tuple[Surface, SeenSurface] | None = None
 
     @property
     def calibration(self) -> Mapping[str, RestCalibration]:
         """Rest calibration per metric; empty until enough rest frames were seen."""
-        return dict(self._calibration)
+        return {
+            name: track.calibration for name, track in self._tracks.items() if track.calibration
+        }
+
+    def listen_to(self, metric: str | None) -> None:
+        """A tree decides by ``metric``: other metrics can wait for a tick that has less to do.
+
+        The local metric never waits, since its distances belong to the picture of the cloud. Until
+        this is called, none does.
+        """
+        self._can_wait = {m.name for m in self._metrics} - {metric, LocalMetric.name}
 
     def observe_rest(self, cloud: PointCloud | None, surface: Surface) -> bool:
         """Learn what the metrics say at rest; True once there is enough to calibrate.
@@ -59,85 +70,75 @@ class WarningMonitor:
             self._rest_stamp_s = cloud.stamp_s
             seen = self._seen_of(surface)
             for metric in self._metrics:
-                values = self._rest[metric.name]
-                value = metric.measure(cloud.points_m, seen).value_m
-                if np.isfinite(value) and len(values) < _MAX_REST_FRAMES:
-                    values.append(value)
-            if all(len(values) >= MIN_REST_FRAMES for values in self._rest.values()):
-                delta_m = self._scene.thresholds.delta_m
-                self._calibration = {
-                    name: calibrate_rest(values, delta_m) for name, values in self._rest.items()
-                }
-        return bool(self._calibration)
+                value_m = metric.measure(cloud.points_m, seen).value_m
+                self._tracks[metric.name].rest(value_m)
+            if all(track.rested for track in self._tracks.values()):
+                for track in self._tracks.values():
+                    track.calibrate()
+        return bool(self.calibration)
 
     def reading(self, cloud: PointCloud | None, surface: Surface, time_s: float) -> MonitorReading:
         """What monitoring says now; ``surface`` is the twin's at ``time_s``.
 
         Without a cloud, or before calibration, mu is NaN and the states stay as they were: a NaN
         has to trip every guard. The reading's stamp is the cloud's. A cloud seen before gives the
-        reading from before.
+        reading from before, completed by the metrics that had to wait.
         """
         self._remember(surface, time_s)
-        if cloud is None or not self._calibration:
+        if cloud is None or not self.calibration:
             return self._unknown(time_s)
-        if self._last is not None and cloud.stamp_s == self._last.stamp_s:
-            return self._last
-        seen = self._seen_of(self._surface_at(cloud.stamp_s))
-        mu: dict[str, float] = {}
-        raw: dict[str, int] = {}
-        per_point = np.zeros(0)
-        for metric in self._metrics:
-            measured = metric.measure(cloud.points_m, seen)
-            calibration = self._calibration[metric.name]
-            mu[metric.name] = calibration.mu_m(measured.value_m)
-            raw[metric.name] = (
-                self._last_state(metric.name)
-                if np.isnan(measured.value_m)
-                else calibration.state(mu[metric.name])
-            )
-            if metric.name == "local":
-                per_point = measured.per_point_m
-        self._raw_states.append(self._settled(raw, cloud.stamp_s))
-        confirmed = {
-            name: min(states[name] for states in self._raw_states)
-            if len(self._raw_states) == CONFIRMING_FRAMES
-            else 0
-            for name in raw
-        }
-        self._last = MonitorReading(cloud.stamp_s, mu, confirmed, per_point)
+        if self._last is None or cloud.stamp_s != self._last.stamp_s:
+            seen = self._seen_of(self._surface_at(cloud.stamp_s))
+            late = cloud.stamp_s - self._caught_up_s >= WAITING_S
+            wait = not late and bool(self._can_wait)
+            self._waiting = (cloud, seen) if wait else None
+            now = [m for m in self._metrics if not (wait and m.name in self._can_wait)]
+            self._last = self._measured(now, cloud, seen, np.zeros(0))
+        elif self._waiting is not None:
+            now = [m for m in self._metrics if m.name in self._can_wait]
+            self._last = self._measured(now, *self._waiting, self._last.per_point_m)
+            self._waiting = None
         return self._last
 
     def twin_changed(self) -> None:
         """Forget surfaces and states of the twin before it learned; the rest values stay."""
         self._surfaces.clear()
-        self._raw_states.clear()
-        self._last = None
+        for track in self._tracks.values():
+            track.forget()
+        self._last = self._waiting = None
 
     def tissue_released(self, time_s: float) -> None:
         """All tissue was let go at ``time_s``: raise no state until it agrees with the twin again.
 
         After 5 s it should; what is still off then counts as ever. Mu is told all the while.
         """
-        self._settling_until_s = time_s + SETTLING_S
+        for track in self._tracks.values():
+            track.settle_until(time_s + SETTLING_S)
 
     def tissue_grasped(self) -> None:
         """Tissue is held again: whatever is off now counts."""
-        self._settling_until_s = -np.inf
+        for track in self._tracks.values():
+            track.settle_until(-np.inf)
 
-    def _settled(self, raw: Mapping[str, int], stamp_s: float) -> Mapping[str, int]:
-        if stamp_s >= self._settling_until_s:
-            return raw
-        if not any(raw.values()):
-            self._settling_until_s = stamp_s
-        return dict.fromkeys(raw, 0)
+    def _measured(
+        self, metrics: Sequence[Metric], cloud: PointCloud, seen: SeenSurface, per_point_m: Floats
+    ) -> MonitorReading:
+        """The reading after ``metrics`` compared a cloud; the other metrics say what they said."""
+        for metric in metrics:
+            measured = metric.measure(cloud.points_m, seen)
+            self._tracks[metric.name].take(measured.value_m, cloud.stamp_s)
+            if metric.name == LocalMetric.name:
+                per_point_m = measured.per_point_m
+            if metric.name in self._can_wait:
+                self._caught_up_s = cloud.stamp_s
+        mu_m = {name: track.mu_m for name, track in self._tracks.items()}
+        return MonitorReading(cloud.stamp_s, mu_m, self._states(), per_point_m)
 
     def _unknown(self, time_s: float) -> MonitorReading:
-        names = [metric.name for metric in self._metrics]
-        states = {name: self._last_state(name) for name in names}
-        return MonitorReading(time_s, dict.fromkeys(names, float("nan")), states)
+        return MonitorReading(time_s, dict.fromkeys(self._tracks, float("nan")), self._states())
 
-    def _last_state(self, name: str) -> int:
-        return self._last.warning_state[name] if self._last else 0
+    def _states(self) -> dict[str, int]:
+        return {name: track.state for name, track in self._tracks.items()}
 
     def _remember(self, surface: Surface, time_s: float) -> None:
         while self._surfaces and self._surfaces[-1][0] >= time_s:

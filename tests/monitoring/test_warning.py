@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
+from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.monitoring.seen import SeenSurface, seen_surface
 from defras_bt.monitoring.warning import WarningMonitor
 from defras_sim.geometry import Floats
@@ -166,3 +168,51 @@ class TestRelease:
         rested.tissue_grasped()
         reading = self.warn(rested, slab(raised(0.009)), slab(), take_cloud, 2.1)
         assert reading.warning_state["local"] == 3
+
+
+class TestMetricsThatCanWait:
+    def readings(
+        self, monitor: WarningMonitor, slab: Slab, take_cloud: Take, ticks: int, every: int
+    ) -> list[MonitorReading]:
+        """What is said in ticks of 50 ms; ``every`` so many brings a cloud of tissue that rises."""
+        said = []
+        for tick in range(ticks):
+            frame, time = tick // every, 2.0 + 0.05 * tick
+            stamp = 2.0 + 0.05 * every * frame
+            cloud = PointCloud(stamp, take_cloud(slab(raised(4e-4 * frame)), frame))
+            said.append(monitor.reading(cloud, slab(), time))
+        return said
+
+    def test_they_say_the_same_one_tick_later(
+        self, rested: WarningMonitor, slab: Slab, take_cloud: Take
+    ) -> None:
+        patient = copy.deepcopy(rested)
+        patient.listen_to("local")
+        at_once = self.readings(rested, slab, take_cloud, 40, every=2)
+        later = self.readings(patient, slab, take_cloud, 40, every=2)
+        for tick, (soon, late) in enumerate(zip(at_once, later, strict=True)):
+            assert late.stamp_s == soon.stamp_s
+            assert late.mu_m["local"] == soon.mu_m["local"]
+            assert late.warning_state["local"] == soon.warning_state["local"]
+            np.testing.assert_array_equal(late.per_point_m, soon.per_point_m)
+            same = at_once[max(tick - 1, 0)]
+            assert late.mu_m["median"] == same.mu_m["median"]
+            assert late.warning_state["median"] == same.warning_state["median"]
+        assert at_once[-1].warning_state == {"local": 3, "median": 3}
+
+    def test_they_are_heard_once_a_second_where_every_tick_brings_a_cloud(
+        self, rested: WarningMonitor, slab: Slab, take_cloud: Take
+    ) -> None:
+        rested.listen_to("local")
+        said = self.readings(rested, slab, take_cloud, 61, every=1)
+        medians = [reading.mu_m["median"] for reading in said]
+        changes = [tick for tick in range(1, 61) if medians[tick] != medians[tick - 1]]
+        assert changes == [20, 40, 60]
+
+    def test_the_metric_of_the_tree_and_the_local_one_never_wait(
+        self, rested: WarningMonitor, slab: Slab, take_cloud: Take
+    ) -> None:
+        rested.listen_to("median")
+        for reading in self.readings(rested, slab, take_cloud, 4, every=2)[::2]:
+            assert len(reading.per_point_m) > 500
+            assert not np.isnan(list(reading.mu_m.values())).any()
