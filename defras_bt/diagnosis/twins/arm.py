@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from defras_bt.diagnosis.problem import Candidate, Channel, Samples
-from defras_bt.diagnosis.quality import DataFault
+from defras_bt.diagnosis.quality import DataFault, DataQuality
 from defras_bt.diagnosis.tables import Table
 from defras_bt.diagnosis.tables_quality import (
     measured_rows,
@@ -54,35 +54,47 @@ class JointRun:
 class ArmProblem(TableProblem):
     """Trajectories of one arm; channels are the joints that were measured."""
 
-    def __init__(self, tables: Sequence[Table]) -> None:
+    def __init__(self, runs: Sequence[JointRun], quality_: DataQuality) -> None:
+        self.runs = tuple(runs)
+        seen = np.any([np.isfinite(run.measured).any(axis=0) for run in self.runs], axis=0)
+        self._joints = [i for i in range(len(JOINTS)) if seen[i]]
+        super().__init__(
+            _samples(self.runs, self._joints),
+            joint_candidates(self._setpoints, [JOINTS[i] for i in self._joints]),
+            self._compared([run.measured for run in self.runs]),
+            quality_,
+        )
+
+    @staticmethod
+    def of_tables(tables: Sequence[Table]) -> ArmProblem:
         """
         Raises:
             InvalidFile: a column is missing, set-points are in another unit than their header
                 says, or no joint can be compared.
         """
         faults: list[DataFault] = []
-        self._runs = tuple(_run(table, faults) for table in tables)
-        seen = np.any([np.isfinite(run.measured).any(axis=0) for run in self._runs], axis=0)
-        if not seen.any():
-            raise tables[0].fault("no joint was measured; expected columns as 'q5_measured_rad'")
-        self._joints = [i for i in range(len(JOINTS)) if seen[i]]
-        setpoints = [run.setpoint for run in self._runs]
-        super().__init__(
-            _samples(self._runs, self._joints),
-            joint_candidates(setpoints, [JOINTS[i] for i in self._joints]),
-            self._compared([run.measured for run in self._runs]),
-            quality(tables, faults),
-        )
+        runs = [_run(table, faults) for table in tables]
+        if not any(np.isfinite(run.measured).any() for run in runs):
+            found = "; ".join(fault.sentence for fault in faults)
+            raise tables[0].fault(
+                "no joint was measured; expected columns as 'q5_measured_rad' with numbers in them"
+                + (f" ({found})" if found else "")
+            )
+        return ArmProblem(runs, quality(tables, faults))
+
+    @property
+    def _setpoints(self) -> list[Floats]:
+        return [run.setpoint for run in self.runs]
 
     def predicted(self, model: Extension) -> Floats:
-        return self._compared([true_joints(model, run.time_s, run.setpoint) for run in self._runs])
+        return self._compared([true_joints(model, run.time_s, run.setpoint) for run in self.runs])
 
     def starts(
         self, model: Extension, candidate: Candidate
     ) -> Sequence[tuple[Values, Sequence[Values]]]:
         if candidate.effect.name != JOINT_PLAY.name:
             return ()
-        return play_starts([run.setpoint for run in self._runs], candidate)
+        return play_starts(self._setpoints, candidate)
 
     def _compared(self, joints: Sequence[Floats]) -> Floats:
         """The numbers that are compared, of each run's (rows, 6): by run, joint, time."""

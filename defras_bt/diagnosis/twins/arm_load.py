@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from defras_bt.diagnosis.problem import Candidate, Channel, Integers, Samples
-from defras_bt.diagnosis.quality import DataFault, Mask, Sieve
+from defras_bt.diagnosis.quality import DataFault, DataQuality, Mask, Sieve
 from defras_bt.diagnosis.tables import Table
 from defras_bt.diagnosis.tables_quality import measured_rows, quality, rows_in_time, scatter
 from defras_bt.diagnosis.twins.table_problem import TableProblem, fold_of_rows
@@ -32,8 +32,7 @@ _CONTACT_SHARE = 0.05
 
 @dataclass(frozen=True)
 class LoadRun:
-    """One axis in one run, rows in order. ``error_m``: measured less kinematic tip, NaN where
-    nothing was measured."""
+    """One axis in one run, rows (n,) in order. ``error_m``: measured less kinematic tip."""
 
     name: str
     axis: str
@@ -51,26 +50,42 @@ class ArmLoadProblem(TableProblem):
     less its mean: only how the error *changes* with the force counts.
     """
 
-    def __init__(self, tables: Sequence[Table]) -> None:
+    def __init__(self, runs: Sequence[LoadRun], quality_: DataQuality) -> None:
+        self.runs = tuple(runs)
+        axes = [axis for axis in AXES if any(run.axis == axis for run in self.runs)]
+        super().__init__(
+            _samples(self.runs, axes),
+            tuple(cause for axis in axes for cause in _causes(self.runs, axis)),
+            np.concatenate([_centred(run.error_m) for run in self.runs]),
+            quality_,
+        )
+
+    @staticmethod
+    def of_tables(tables: Sequence[Table]) -> ArmLoadProblem:
         """
         Raises:
             InvalidFile: a column is missing, or no axis has all of its columns.
         """
         faults: list[DataFault] = []
-        self._runs = tuple(run for table in tables for run in _runs(table, faults))
-        axes = [axis for axis in AXES if any(run.axis == axis for run in self._runs)]
-        if not axes:
+        runs = [run for table in tables for run in _runs(table, faults)]
+        if not runs:
             raise tables[0].fault(
                 "no axis has force, set-point and measured tip; expected columns as 'force_x_N', "
                 "'tip_setpoint_x_m', 'tip_measured_x_m' and 'reach_m'"
             )
-        candidates = [cause for axis in axes for cause in _causes(self._runs, axis)]
-        super().__init__(
-            _samples(self._runs, axes),
-            tuple(candidates),
-            np.concatenate([_centred(run.error_m, run.error_m) for run in self._runs]),
-            quality(tables, faults),
-        )
+        return ArmLoadProblem(runs, quality(tables, faults))
+
+    def split_by_range(self) -> tuple[ArmLoadProblem, ArmLoadProblem, str] | None:
+        """The shorter reaches, and the longer ones; there should be two of each."""
+        levels = _levels(self.runs)
+        order = sorted(set(levels))
+        if len(order) < 4:
+            return None
+        last = order[(len(order) - 1) // 2]
+        near = [run for run, level in zip(self.runs, levels, strict=True) if level <= last]
+        far = [run for run, level in zip(self.runs, levels, strict=True) if level > last]
+        words = f"a reach of {last * _SAME_REACH_M:.3f} m"
+        return ArmLoadProblem(near, self.quality), ArmLoadProblem(far, self.quality), words
 
     def predicted(self, model: Extension) -> Floats:
         unknown = [name for name in model if name != ARM_COMPLIANCE.name]
@@ -78,11 +93,11 @@ class ArmLoadProblem(TableProblem):
             raise ValueError(f"{', '.join(unknown)} cannot be seen in pushes of an arm at rest")
         values = model.get(ARM_COMPLIANCE.name, {})
         found = []
-        for run in self._runs:
+        for run in self.runs:
             force_n = np.zeros((len(run.force_n), len(AXES)))
             force_n[:, AXES.index(run.axis)] = run.force_n
             shift_m = ARM_COMPLIANCE.deflection_m(values, run.reach_m, force_n)
-            found.append(_centred(shift_m[:, AXES.index(run.axis)], run.error_m))
+            found.append(_centred(shift_m[:, AXES.index(run.axis)]))
         return np.concatenate(found)
 
 
@@ -145,9 +160,8 @@ def _levels(runs: Sequence[LoadRun]) -> list[int]:
     return [round(float(np.mean(run.reach_m)) / _SAME_REACH_M) for run in runs]
 
 
-def _centred(values: Floats, where: Floats) -> Floats:
-    """``values`` less their mean where ``where`` is a number."""
-    return values - np.mean(values[np.isfinite(where)])
+def _centred(values: Floats) -> Floats:
+    return values - np.mean(values)
 
 
 def _folds(runs: Sequence[LoadRun]) -> list[Integers]:

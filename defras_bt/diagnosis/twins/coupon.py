@@ -16,6 +16,7 @@ from defras_bt.diagnosis.problem import Candidate, Channel, Samples
 from defras_bt.diagnosis.quality import DataFault, DataQuality, Mask, Sieve
 from defras_bt.diagnosis.tables import Table
 from defras_bt.diagnosis.tables_quality import measured_rows, quality, rows_in_time, scatter
+from defras_bt.diagnosis.twins.coupon_remarks import last_hold, linearity_remark
 from defras_bt.diagnosis.twins.table_problem import TableProblem, fold_of_rows
 from defras_sim.coupon.specimen import nominal_stress_pa
 from defras_sim.effects.effect import Effect, Extension, Values
@@ -32,6 +33,9 @@ _STILL = 1e-3
 """Of the largest rate of a run: with less it is held."""
 _WIDTHS = (0.1, 0.25, 0.5, 1.0)
 _TIMES = 12
+_SPLIT = 0.6
+_ENOUGH = 20
+"""Rows; with fewer nothing is scored."""
 _FLOOR_SHARE = 0.01
 """Of the largest force: what load cells and specimens are not reproducible to."""
 
@@ -97,14 +101,29 @@ class CouponProblem(TableProblem):
         part.young_modulus_pa = self.young_modulus_pa
         return part
 
+    def split_by_range(self) -> tuple[CouponProblem, CouponProblem, str] | None:
+        """Up to 60 % of the way to the largest stretch, and beyond."""
+        largest = max(float(np.max(run.stretch)) for run in self.runs)
+        limit = 1 + _SPLIT * (largest - 1)
+        below, above = self.within(0.0, limit), self.within(limit, np.inf)
+        enough = all(np.isfinite(p.measured).sum() >= _ENOUGH for p in (below, above))
+        return (below, above, f"a stretch of {limit:.2f}") if enough else None
+
+    def remarks(self, model: Extension) -> Sequence[str]:
+        holds = []
+        for run in self.runs:
+            force_n = self._force_n(model, run)
+            held = _phases(run) == PHASES.index("holding")
+            holds.append(last_hold(run.stretch, run.force_n, force_n, held, run.time_s))
+        found = linearity_remark([hold for hold in holds if hold is not None])
+        return [found] if found else []
+
     def predicted(self, model: Extension) -> Floats:
-        return np.concatenate(
-            [
-                run.area_m2
-                * nominal_stress_pa(model, self.young_modulus_pa, run.time_s, run.stretch)
-                for run in self.runs
-            ]
-        )
+        return np.concatenate([self._force_n(model, run) for run in self.runs])
+
+    def _force_n(self, model: Extension, run: PullRun) -> Floats:
+        stress_pa = nominal_stress_pa(model, self.young_modulus_pa, run.time_s, run.stretch)
+        return run.area_m2 * stress_pa
 
     def starts(
         self, model: Extension, candidate: Candidate

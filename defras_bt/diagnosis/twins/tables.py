@@ -26,10 +26,10 @@ def read_problem(paths: Sequence[Path], twin: Literal["arm", "coupon"]) -> Table
         return CouponProblem.of_tables(tables)
     under_load = [any(c.startswith("force_") for c in table.columns) for table in tables]
     if all(under_load):
-        return ArmLoadProblem(tables)
+        return ArmLoadProblem.of_tables(tables)
     if any(under_load):
         odd = tables[under_load.index(True)]
         raise odd.fault(
             "holds an arm under load, other tables its joints over time; diagnose them apart"
         )
-    return ArmProblem(tables)
+    return ArmProblem.of_tables(tables)
