@@ -1,0 +1,178 @@
+"""From a problem to a diagnosis: the whole way, and what is left of it when interrupted."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from defras_bt.diagnosis.columns import Sketch, sketch
+from defras_bt.diagnosis.confounding import confounding_of
+from defras_bt.diagnosis.diagnosis import Diagnosis
+from defras_bt.diagnosis.excess import removed_share
+from defras_bt.diagnosis.exclusion import exclusions
+from defras_bt.diagnosis.findings import Findings
+from defras_bt.diagnosis.fitting import (
+    CountedProblem,
+    Fit,
+    begin,
+    differentiate,
+    extend,
+    refine,
+)
+from defras_bt.diagnosis.intervals import estimates, standard_errors
+from defras_bt.diagnosis.layout import layout
+from defras_bt.diagnosis.noise import estimate_noise
+from defras_bt.diagnosis.outside import left_over
+from defras_bt.diagnosis.problem import Candidate, Problem
+from defras_bt.diagnosis.ranking import board, start_of, whitened_products
+from defras_bt.diagnosis.selection import Progress, Search, select
+from defras_bt.diagnosis.sets import rivals
+from defras_bt.diagnosis.settings import Settings
+from defras_bt.diagnosis.verdict_building import diagnosis_of
+from defras_sim.effects.effect import Extension, Values
+
+
+@runtime_checkable
+class KnowsItsOwnErrors(Protocol):
+    """A problem whose twin knows how far its own approximations move a fit."""
+
+    def systematic(self, model: Extension, candidate: Candidate) -> Values:
+        """Standard error by parameter, in its unit, that more data would not lessen (the fit
+        repeated on another mesh)."""
+        ...
+
+
+def diagnose(
+    problem: Problem,
+    rng: np.random.Generator,
+    *,
+    settings: Settings | None = None,
+    progress: Progress | None = None,
+    beyond_range: Problem | None = None,
+    new_grasp: Problem | None = None,
+) -> Diagnosis:
+    """Find what makes ``problem``'s twin differ from its data.
+
+    ``beyond_range`` and ``new_grasp`` are problems with the same candidates and other data, on
+    which the gain is measured and nothing is fitted. ``progress`` is told a sentence and the share
+    of it that is done. An interrupt (Ctrl-C) ends the search; what was found until then is
+    returned, marked incomplete. Before the plain model's residual is known there is nothing to
+    return, and the interrupt passes on.
+
+    Raises:
+        ValueError: the problem's samples or tangents contradict themselves.
+    """
+    told = progress or _silent
+    told("what the plain model says", 0.0)
+    found = _begun(problem, settings or Settings(), rng)
+    try:
+        _look(found, told)
+        select(found.search, told)
+        _settle(found, told)
+        for name, further in (("beyond_range", beyond_range), ("new_grasp", new_grasp)):
+            if further is not None:
+                told(f"the gain {name.replace('_', ' ')}", 0.9)
+                found.further[name] = removed_share(
+                    further.residual(found.base.model),
+                    further.residual(found.search.fit.model),
+                    further.samples,
+                )
+        found.complete = True
+    except KeyboardInterrupt:
+        told("interrupted; what was found until now is kept", 1.0)
+    return diagnosis_of(found)
+
+
+def _silent(sentence: str, share: float) -> None:
+    pass
+
+
+def _begun(problem: Problem, settings: Settings, rng: np.random.Generator) -> Findings:
+    samples = problem.samples
+    series = layout(samples)
+    counted = CountedProblem(problem, {})
+    if len(counted.plain) != len(samples.time_s):
+        raise ValueError(
+            f"the problem's residual has {len(counted.plain)} numbers and its samples label "
+            f"{len(samples.time_s)}; there should be one label for each"
+        )
+    nothing = begin(counted, {})
+    noise = estimate_noise(counted.plain, samples, series)
+    empty = Sketch((), {})
+    search = Search(counted, samples, series, empty, settings, rng, nothing, noise)
+    return Findings(search, nothing)
+
+
+def _look(found: Findings, told: Progress) -> None:
+    """Fit the base, see what each candidate would change, and what looks alike."""
+    search = found.search
+    problem = search.counted.problem
+    base = [c for c in problem.candidates if c.base]
+    at_null = sketch(problem, {}, base)
+    for candidate in base:
+        told(f"fitting {candidate.key}", 0.0)
+        now = board(at_null, search.fit.jacobian, search.samples.fold, [candidate.key])
+        residual = np.nan_to_num(search.fit.residual)[:, None]
+        option, amplitudes = start_of(
+            now, whitened_products(now, search.noise, residual), candidate.key, 0
+        )
+        fit = extend(
+            search.counted,
+            search.fit,
+            candidate,
+            option,
+            amplitudes,
+            search.noise,
+            iterations=search.settings.iterations,
+        )
+        if fit is None:
+            raise ValueError(f"the twin cannot follow any value of its base {candidate.key}")
+        search.fit = fit
+        search.noise = estimate_noise(fit.residual, search.samples, search.layout)
+    found.base = search.fit
+    told("what each effect would change", 0.0)
+    search.sketch = sketch(problem, found.base.model, problem.candidates, told)
+    found.confounding = confounding_of(search.sketch, search.samples)
+
+
+def _settle(found: Findings, told: Progress) -> None:
+    """Intervals, rivals, what is left over, and what is excluded."""
+    search = found.search
+    if search.fit.free:
+        told("how well parameters are known", 0.5)
+        search.fit = _arrived(search)
+        _measure_intervals(found)
+    for key in search.accepted():
+        found.rivals[key] = rivals(search, key, found.confounding, told)
+    told("what is left over", 0.7)
+    left = search.held_out(search.fit, search.noise).residual
+    found.left = left_over(
+        left, search.samples, search.noise, search.settings.surrogates, search.rng
+    )
+    told("what is excluded", 0.8)
+    found.excluded, found.unseen = exclusions(search)
+
+
+def _arrived(search: Search) -> Fit:
+    """The fit with fresh derivatives, and what they still gain."""
+    fresh = differentiate(search.counted, search.fit)
+    return refine(search.counted, fresh, search.noise, iterations=2)
+
+
+def _measure_intervals(found: Findings) -> None:
+    search = found.search
+    errors = standard_errors(
+        search.fit.jacobian,
+        search.fit.residual,
+        search.noise,
+        search.samples,
+        search.settings.surrogates,
+        search.rng,
+    )
+    problem = search.counted.problem
+    for candidate in search.fit.candidates:
+        systematic: Values = {}
+        if isinstance(problem, KnowsItsOwnErrors):
+            systematic = problem.systematic(search.fit.model, candidate)
+        found.estimates[candidate.key] = estimates(search.fit, candidate, errors, systematic)

@@ -1,0 +1,33 @@
+"""What a diagnosis has found so far; grows, so that an interrupted one can be reported."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from defras_bt.diagnosis.confounding import Confounding
+from defras_bt.diagnosis.fitting import Fit
+from defras_bt.diagnosis.outside import LeftOver
+from defras_bt.diagnosis.selection import Search
+from defras_bt.diagnosis.verdict import Estimate, Excluded
+
+
+def _nothing_known() -> Confounding:
+    return Confounding((), np.zeros((0, 0)), np.zeros(0), np.zeros(0))
+
+
+@dataclass
+class Findings:
+    """``base``: the model with base parameters only. ``further``: gain by name of further data."""
+
+    search: Search
+    base: Fit
+    confounding: Confounding = field(default_factory=_nothing_known)
+    rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    estimates: dict[str, dict[str, Estimate]] = field(default_factory=dict)
+    excluded: dict[str, Excluded] = field(default_factory=dict)
+    unseen: tuple[str, ...] = ()
+    left: LeftOver = field(default_factory=lambda: LeftOver(()))
+    further: dict[str, float | None] = field(default_factory=dict)
+    complete: bool = False

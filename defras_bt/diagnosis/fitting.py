@@ -1,0 +1,283 @@
+"""Full fits: bounded, damped Gauss-Newton through the twin itself, with few of its predictions.
+
+The first derivatives come from the tangents that ranked the candidate, or from finite differences
+where those do not name single parameters, and are kept current by Broyden's rank-one updates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from defras_bt.diagnosis.columns import Option
+from defras_bt.diagnosis.noise import Noise
+from defras_bt.diagnosis.problem import Candidate, Problem
+from defras_sim.effects.effect import EffectParameter, Extension
+from defras_sim.geometry import Floats
+
+_DIFFERENCE = 0.25
+"""Of a parameter's step: wide enough to see past a solver's tolerance."""
+_SMALLEST_GAIN = 1e-3
+"""Relative gain of a step after which a fit has arrived."""
+
+
+class CountedProblem:
+    """A problem's residuals with what was compared first as the yardstick, and calls counted.
+
+    Where an extended model stops predicting a number (it hides a place), the residual of the plain
+    model is kept for it, so that nothing is gained or lost by hiding. ``known`` models are not
+    predicted twice.
+    """
+
+    def __init__(self, problem: Problem, plain: Extension) -> None:
+        self.problem = problem
+        self.calls = 0
+        self._known: dict[str, Floats] = {}
+        self.plain = self._predict(plain)
+        if not np.isfinite(self.plain).any():
+            raise ValueError("the plain model cannot be compared with any of the data")
+
+    def residual(self, model: Extension) -> Floats:
+        """As :meth:`Problem.residual`, NaN only where the plain model's is (or everywhere)."""
+        found = self._predict(model)
+        if not np.isfinite(found).any():
+            return found
+        kept = np.where(np.isfinite(found), found, self.plain)
+        return np.where(np.isfinite(self.plain), kept, np.nan)
+
+    def _predict(self, model: Extension) -> Floats:
+        name = repr(sorted((effect, sorted(values.items())) for effect, values in model.items()))
+        if name not in self._known:
+            self._known[name] = np.asarray(self.problem.residual(model), dtype=float)
+            self.calls += 1
+        return self._known[name]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """``candidates`` fitted together. ``jacobian`` (n, k): change of the prediction per step of
+    each of ``free`` (candidate key, parameter); ``residual`` (n,)."""
+
+    candidates: tuple[Candidate, ...]
+    model: Extension
+    free: tuple[tuple[str, EffectParameter], ...]
+    residual: Floats
+    jacobian: Floats
+    calls: int = 0
+    start: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        return tuple(c.key for c in self.candidates)
+
+    def values_of(self, key: str) -> dict[str, float]:
+        """Fitted parameters of one candidate."""
+        return {
+            p.name: self.model[c.effect.name][p.name]
+            for c in self.candidates
+            if c.key == key
+            for p in c.free
+        }
+
+
+def conflicts(first: Candidate, second: Candidate) -> bool:
+    """Whether both need the same parameters of one effect, so that they cannot be together."""
+    if first.effect.name != second.effect.name:
+        return False
+    names = {p.name for p in first.free}
+    return bool(names & {p.name for p in second.free}) or first.key == second.key
+
+
+def added(model: Extension, candidate: Candidate, values: Mapping[str, float]) -> Extension:
+    """``model`` with ``values`` of the candidate's effect."""
+    name = candidate.effect.name
+    return {**model, name: {**model.get(name, {}), **values}}
+
+
+def begin(counted: CountedProblem, model: Extension) -> Fit:
+    """A fit of nothing."""
+    residual = counted.residual(model)
+    return Fit((), model, (), residual, np.zeros((len(residual), 0)))
+
+
+def extend(
+    counted: CountedProblem,
+    fit: Fit,
+    candidate: Candidate,
+    option: Option,
+    amplitudes: Floats,
+    noise: Noise,
+    *,
+    iterations: int,
+) -> Fit | None:
+    """``fit`` with ``candidate`` added, all fitted together, begun at ``amplitudes`` (k,) of one
+    of its options; None where the twin can follow none of the models in its direction."""
+    before = counted.calls
+    for share in (1.0, 0.5, 0.25):
+        values = option.tangent.values(share * amplitudes, candidate.free)
+        start = added(fit.model, candidate, values)
+        residual = counted.residual(start)
+        if np.isfinite(residual).any():
+            break
+    else:
+        return None
+    free = fit.free + tuple((candidate.key, p) for p in candidate.free)
+    candidates = (*fit.candidates, candidate)
+    begun = Fit(candidates, start, free, residual, np.zeros((len(residual), 0)))
+    known: list[Floats | None] = list(fit.jacobian.T)
+    known += _from_tangent(option, candidate.free)
+    jacobian = _jacobian(counted, begun, known)
+    begun = Fit(candidates, start, free, residual, jacobian, start={candidate.key: values})
+    done = refine(counted, begun, noise, iterations=iterations)
+    return Fit(
+        candidates,
+        done.model,
+        free,
+        done.residual,
+        done.jacobian,
+        counted.calls - before,
+        begun.start,
+    )
+
+
+def without(counted: CountedProblem, fit: Fit, key: str, noise: Noise, *, iterations: int) -> Fit:
+    """``fit`` with one of its candidates taken out and the others fitted anew."""
+    gone = next(c for c in fit.candidates if c.key == key)
+    values = dict(fit.model[gone.effect.name])
+    others = [c for c in fit.candidates if c.key != key]
+    for p in gone.effect.parameters:
+        shared = any(c.effect is gone.effect for c in others)
+        if p.name in values and (not shared or p in gone.free):
+            del values[p.name]
+    model = {name: v for name, v in fit.model.items() if name != gone.effect.name}
+    if values:
+        model[gone.effect.name] = values
+    keep = [i for i, (k, _) in enumerate(fit.free) if k != key]
+    begun = Fit(
+        tuple(others),
+        model,
+        tuple(fit.free[i] for i in keep),
+        counted.residual(model),
+        fit.jacobian[:, keep],
+    )
+    return refine(counted, begun, noise, iterations=iterations)
+
+
+def refine(counted: CountedProblem, fit: Fit, noise: Noise, *, iterations: int) -> Fit:
+    """Gauss-Newton with Levenberg's damping, Broyden's updates and bounds, from ``fit`` on."""
+    if not fit.free:
+        return fit
+    before = counted.calls
+    place = np.array([_value(fit.model, fit.candidates, key, p) / p.step for key, p in fit.free])
+    lower = np.array([p.lower / p.step for _, p in fit.free])
+    upper = np.array([p.upper / p.step for _, p in fit.free])
+    lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
+    model, residual, jacobian = fit.model, fit.residual, fit.jacobian.copy()
+    damping = 1e-3
+    loss = _loss(noise, residual)
+    for _ in range(iterations):
+        step = _bounded_step(noise, residual, jacobian, damping, lower - place, upper - place)
+        if np.abs(step).max() < 1e-4:
+            break
+        there = np.clip(place + step, lower, upper)
+        trial = _moved(fit, model, there)
+        found = counted.residual(trial)
+        if not np.isfinite(found).any():
+            damping = max(10.0 * damping, 0.1)
+            continue
+        # Broyden's update: the least change of the derivative that explains what was seen.
+        moved = there - place
+        missed = np.nan_to_num(residual - found) - jacobian @ moved
+        jacobian = jacobian + np.outer(missed, moved) / float(moved @ moved)
+        new_loss = _loss(noise, found)
+        if new_loss >= loss:
+            damping = max(10.0 * damping, 0.1)
+            continue
+        gained = (loss - new_loss) / loss
+        place, model, residual, loss = there, trial, found, new_loss
+        damping = damping / 10.0
+        if gained < _SMALLEST_GAIN:
+            break
+    return Fit(
+        fit.candidates, model, fit.free, residual, jacobian, counted.calls - before, fit.start
+    )
+
+
+def differentiate(counted: CountedProblem, fit: Fit) -> Fit:
+    """``fit`` with its derivatives measured anew where it arrived."""
+    before = counted.calls
+    jacobian = _jacobian(counted, fit, [None] * len(fit.free))
+    return Fit(
+        fit.candidates,
+        fit.model,
+        fit.free,
+        fit.residual,
+        jacobian,
+        counted.calls - before,
+        fit.start,
+    )
+
+
+def _bounded_step(
+    noise: Noise, residual: Floats, jacobian: Floats, damping: float, lower: Floats, upper: Floats
+) -> Floats:
+    white = noise.whiten(np.column_stack((jacobian, np.nan_to_num(residual))))
+    scale = np.sqrt(damping * np.maximum((white[:, :-1] ** 2).sum(axis=0), 1e-12))
+    # The QR factor holds all that the long columns say.
+    triangle = np.asarray(np.linalg.qr(white, mode="r"))
+    matrix = np.vstack((triangle[:, :-1], np.diag(scale)))
+    target = np.concatenate((triangle[:, -1], np.zeros(len(scale))))
+    span = np.maximum(upper - lower, 1e-12)
+    found = lsq_linear(matrix, target, (lower - 1e-9 * span, upper + 1e-9 * span))
+    return np.asarray(found.x)
+
+
+def _loss(noise: Noise, residual: Floats) -> float:
+    return float((noise.whiten(np.nan_to_num(residual)[:, None]) ** 2).sum())
+
+
+def _from_tangent(option: Option, free: Sequence[EffectParameter]) -> list[Floats | None]:
+    """Derivatives by parameter steps, where a column moves one parameter alone."""
+    found: list[Floats | None] = [None] * len(free)
+    names = [p.name for p in free]
+    for step, column in zip(option.tangent.steps, option.columns.T, strict=True):
+        moved = [name for name, change in step.items() if change != 0.0]
+        if len(moved) == 1 and moved[0] in names:
+            index = names.index(moved[0])
+            found[index] = column * free[index].step / step[moved[0]]
+    return found
+
+
+def _jacobian(counted: CountedProblem, fit: Fit, known: Sequence[Floats | None]) -> Floats:
+    """Change of predictions per step (n, k); ``known`` columns are taken as they are."""
+    columns = []
+    for (key, p), column in zip(fit.free, known, strict=True):
+        if column is not None:
+            columns.append(column)
+            continue
+        value = _value(fit.model, fit.candidates, key, p)
+        change = _DIFFERENCE * p.step
+        if not p.lower <= value + change <= p.upper:
+            change = -change
+        effect = next(c for c in fit.candidates if c.key == key)
+        beside = counted.residual(added(fit.model, effect, {p.name: value + change}))
+        columns.append(np.nan_to_num(fit.residual - beside) * (p.step / change))
+    return np.stack(columns, axis=1) if columns else np.zeros((len(fit.residual), 0))
+
+
+def _value(
+    model: Extension, candidates: Sequence[Candidate], key: str, p: EffectParameter
+) -> float:
+    effect = next(c.effect.name for c in candidates if c.key == key)
+    return float(model.get(effect, {}).get(p.name, p.null))
+
+
+def _moved(fit: Fit, model: Extension, place: Floats) -> Extension:
+    for (key, p), value in zip(fit.free, place, strict=True):
+        candidate = next(c for c in fit.candidates if c.key == key)
+        kept = float(np.clip(value * p.step, p.lower, p.upper))
+        model = added(model, candidate, {p.name: kept})
+    return model

@@ -1,0 +1,183 @@
+"""Autocorrelated noise: estimated from a residual, per channel, with gaps and outliers.
+
+Residuals of simulations are anything but independent, and tests that assume they are always find
+something. What the residual's own past predicts is therefore taken out of everything before it is
+compared (generalised least squares).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from defras_bt.diagnosis.layout import Layout, Series
+from defras_bt.diagnosis.problem import Channel, Samples
+from defras_bt.diagnosis.whitening import companion, innovations, stationary_covariance
+from defras_sim.geometry import Floats
+
+_ORDERS = (0, 1, 2, 3, 4, 6, 8)
+_SHARED = 300.0
+"""Samples' worth of weight that the other channels of the same sensor have in a channel's
+autocorrelation: short series borrow, long ones keep their own."""
+_LARGEST = 4.0
+"""Robust standard deviations beyond which a residual is an outlier."""
+_LARGEST_ROOT = 0.998
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """``x_t = sum_k ar[k-1] x_{t-k} + innovation_sd e_t`` with standard deviation ``sd``."""
+
+    sd: float
+    ar: Floats
+    innovation_sd: float
+
+
+@dataclass(frozen=True)
+class Noise:
+    """``seen`` (n,): samples that are compared. ``weight`` (n,): 1, less where a sample is an
+    outlier."""
+
+    layout: Layout
+    channels: tuple[ChannelNoise, ...]
+    seen: NDArray[np.bool_]
+    weight: Floats
+
+    def whiten(self, columns: Floats) -> Floats:
+        """``columns`` (n, k) in units in which this noise is independent and of variance 1; zero
+        where nothing is compared."""
+        found = np.zeros(columns.shape)
+        for one in self.layout.series:
+            keep = self.seen[one.rows]
+            if not keep.any():
+                continue
+            noise = self.channels[one.channel]
+            rows = np.arange(one.start, one.stop)[keep]
+            slot = one.slot[keep] - one.slot[keep][0]
+            found[rows] = innovations(columns[rows], slot, noise.ar, noise.innovation_sd)
+        return found * np.sqrt(self.weight)[:, None]
+
+
+def tolerances(samples: Samples) -> Floats:
+    """What is small in each channel (c,): its sensor's scatter and practical floor together.
+
+    Raises:
+        ValueError: a channel has neither.
+    """
+    found = np.array([np.hypot(c.noise_sd, c.floor) for c in samples.channels])
+    if np.any(~(found > 0.0)):
+        name = samples.channels[int(np.argmin(found > 0.0))].name
+        raise ValueError(f"channel {name}: noise_sd or floor should be above zero, both are not")
+    return found
+
+
+def estimate_noise(
+    residual: Floats, samples: Samples, found: Layout, orders: Sequence[int] | None = None
+) -> Noise:
+    """Noise whose realisation ``residual`` (n,) could be; NaN where nothing is compared.
+
+    ``orders`` (c,) of the autoregressions; None: Schwarz's criterion chooses.
+    """
+    seen = np.isfinite(residual)
+    tolerance = tolerances(samples)
+    scale = np.array(
+        [
+            max(robust_sd(residual[(samples.channel == c) & seen]), 0.05 * tolerance[c])
+            for c in range(len(samples.channels))
+        ]
+    )
+    standard = np.clip(residual / scale[samples.channel], -_LARGEST, _LARGEST)
+    order = _largest_order(found, seen) if orders is None else max(orders)
+    moments = np.zeros((len(samples.channels), order + 1, order + 1))
+    counts = np.zeros(len(samples.channels))
+    for one in found.series:
+        windows = _windows(standard, seen, one, order)
+        moments[one.channel] += windows.T @ windows
+        counts[one.channel] += len(windows)
+    channels = tuple(
+        _fit(
+            moments,
+            counts,
+            c,
+            samples.channels,
+            float(scale[c]),
+            _ORDERS if orders is None else (orders[c],),
+        )
+        for c in range(len(samples.channels))
+    )
+    plain = Noise(found, channels, seen, np.ones(len(residual)))
+    new = np.abs(plain.whiten(np.where(seen, residual, 0.0)[:, None])[:, 0])
+    weight = np.minimum(1.0, _LARGEST / np.maximum(new, _LARGEST))
+    return Noise(found, channels, seen, weight)
+
+
+def robust_sd(values: Floats) -> float:
+    """Root mean square about zero, outliers pulled in to four robust standard deviations."""
+    if not len(values):
+        return 0.0
+    middle = 1.4826 * float(np.median(np.abs(values)))
+    if middle > 0.0:
+        values = np.clip(values, -_LARGEST * middle, _LARGEST * middle)
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _largest_order(found: Layout, seen: NDArray[np.bool_]) -> int:
+    most = max(int(seen[one.rows].sum()) for one in found.series)
+    return max(order for order in _ORDERS if order == 0 or order <= most // 20)
+
+
+def _windows(standard: Floats, seen: NDArray[np.bool_], one: Series, order: int) -> Floats:
+    """Runs (m, order+1) of successive samples without a gap, the newest first."""
+    keep = seen[one.rows]
+    dense = np.full(one.length, np.nan)
+    dense[one.slot[keep]] = standard[one.rows][keep]
+    if len(dense) <= order:
+        return np.zeros((0, order + 1))
+    runs = sliding_window_view(dense, order + 1)[:, ::-1]
+    return runs[np.isfinite(runs).all(axis=1)]
+
+
+def _fit(
+    moments: Floats,
+    counts: Floats,
+    channel: int,
+    channels: tuple[Channel, ...],
+    sd: float,
+    orders: Sequence[int],
+) -> ChannelNoise:
+    """Least-squares autoregression of one channel, its order one of ``orders`` by Schwarz."""
+    same = [i for i, c in enumerate(channels) if c.sensor == channels[channel].sensor]
+    shared = float(counts[same].sum())
+    if shared < 20.0:
+        return ChannelNoise(sd, np.zeros(0), sd)
+    borrowed = min(_SHARED, shared)
+    moment = moments[channel] + borrowed * moments[same].sum(axis=0) / shared
+    count = counts[channel] + borrowed
+    moment = moment / count + 1e-9 * np.eye(len(moment))
+    best, least, chosen = np.inf, 1.0, np.zeros(0)
+    for order in orders:
+        if order >= len(moment):
+            break
+        past = slice(1, order + 1)
+        ar = np.linalg.solve(moment[past, past], moment[past, 0])
+        left = float(moment[0, 0] - moment[0, past] @ ar)
+        criterion = count * np.log(max(left, 1e-12)) + order * np.log(count)
+        if criterion < best:
+            best, least, chosen = criterion, left, ar
+    return _stable(chosen, float(np.sqrt(max(least, 1e-12))), sd)
+
+
+def _stable(ar: Floats, innovation_sd: float, sd: float) -> ChannelNoise:
+    """Pull roots inwards until the process is stationary and not wilder than what was seen."""
+    if not len(ar):
+        return ChannelNoise(sd, ar, innovation_sd * sd)
+    root = float(np.abs(np.linalg.eigvals(companion(ar))).max())
+    if root > _LARGEST_ROOT:
+        ar = ar * (_LARGEST_ROOT / root) ** np.arange(1, len(ar) + 1)
+    while stationary_covariance(ar, innovation_sd)[0, 0] > 2.0:
+        ar = ar * 0.998 ** np.arange(1, len(ar) + 1)
+    return ChannelNoise(sd, ar, innovation_sd * sd)

@@ -1,0 +1,113 @@
+"""Which other causes explain the same: those that could be true and still look this much worse.
+
+For every rival, data are made as it would make them (its fitted prediction and surrogate noise),
+and both are fitted again. If the accepted cause is as far ahead on the measured data as it hardly
+ever is on those, the rival is rejected (Cox 1962, by simulation: Williams 1970).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from defras_bt.diagnosis.confounding import Confounding
+from defras_bt.diagnosis.fitting import Fit, conflicts, extend, without
+from defras_bt.diagnosis.held_out import losses, products
+from defras_bt.diagnosis.ranking import board, score, start_of, whitened_products
+from defras_bt.diagnosis.selection import Progress, Search
+from defras_bt.diagnosis.surrogates import surrogates
+from defras_sim.geometry import Floats
+
+_ALIKE = 0.8
+_MOST = 3
+
+
+def rivals(search: Search, key: str, confounding: Confounding, told: Progress) -> tuple[str, ...]:
+    """Candidates that cannot be told from the accepted cause ``key`` with this data."""
+    fits = _rival_fits(search, key, confounding, told)
+    return tuple(rival for rival, fit in fits.items() if not _rejected(search, key, rival, fit))
+
+
+def _rival_fits(
+    search: Search, key: str, confounding: Confounding, told: Progress
+) -> dict[str, Fit]:
+    """Models in which a rival takes the place of ``key``."""
+    fits = search.fits.get(key, {})
+    last = search.accepted()[-1] == key
+    names = list(dict.fromkeys((*fits, *confounding.alike(key, _ALIKE)[:_MOST])))
+    mine = search.sketch.candidate(key)
+    others = [c for c in search.fit.candidates if c.key != key]
+    found: dict[str, Fit] = {}
+    less: Fit | None = None
+    for name in names:
+        rival = search.sketch.candidate(name)
+        if name == key or rival.base or any(conflicts(rival, other) for other in others):
+            continue
+        if rival.nuisance and not mine.nuisance:
+            continue  # re-tuned along all the time: it did not explain what was named
+        if last and name in fits:
+            found[name] = fits[name]
+            continue
+        told(f"whether {name} explains the same as {key}", 0.5)
+        if less is None:
+            less = without(
+                search.counted, search.fit, key, search.noise, iterations=search.settings.iterations
+            )
+        fit = _begun_from_ranking(search, less, name, key)
+        if fit is not None:
+            found[name] = fit
+    return found
+
+
+def _begun_from_ranking(search: Search, less: Fit, name: str, key: str) -> Fit | None:
+    nuisances = [
+        c.key
+        for c in search.sketch.candidates
+        if c.nuisance and c.key not in (name, key) and c.key not in less.keys
+    ]
+    now = board(search.sketch, less.jacobian, search.samples.fold, [name, *nuisances])
+    if not now.of_option[name]:
+        return None
+    found = whitened_products(now, search.noise, np.nan_to_num(less.residual)[:, None])
+    option, amplitudes = start_of(now, found, name, int(score(now, found).option[name][0]))
+    return extend(
+        search.counted,
+        less,
+        search.sketch.candidate(name),
+        option,
+        amplitudes,
+        search.noise,
+        iterations=search.settings.iterations,
+    )
+
+
+def _rejected(search: Search, key: str, rival: str, fit: Fit) -> bool:
+    """Whether data made by ``rival`` would hardly ever speak for ``key`` as the measured do."""
+    mine = search.fit
+    columns = {
+        name: np.concatenate((one.jacobian, search.nuisance_columns(key, rival)), axis=1)
+        for name, one in (("mine", mine), ("rival", fit))
+    }
+    noise, fold = search.noise, search.samples.fold
+    white = {name: noise.whiten(one) for name, one in columns.items()}
+
+    def ahead(mine_left: Floats, rival_left: Floats) -> Floats:
+        total = {
+            name: losses(
+                products(white[name], noise.whiten(left), fold), np.arange(white[name].shape[1])
+            ).total
+            for name, left in (("mine", mine_left), ("rival", rival_left))
+        }
+        return np.asarray(total["rival"] - total["mine"])
+
+    seen = noise.seen
+    mine_left = np.where(seen, mine.residual, 0.0)[:, None]
+    rival_left = np.where(seen, fit.residual, 0.0)[:, None]
+    measured = float(ahead(mine_left, rival_left)[0])
+    if measured <= 0.0:
+        return False
+    apart = mine_left - rival_left
+    by_chance = [
+        ahead(drawn + apart, drawn)
+        for drawn in surrogates(noise, mine.residual, search.settings.surrogates, search.rng)
+    ]
+    return measured > float(np.quantile(np.concatenate(by_chance), 1.0 - search.settings.alike))

@@ -1,0 +1,147 @@
+"""The verdict: from what was found to named, set, outside or nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from defras_bt.diagnosis.diagnosis import Diagnosis
+from defras_bt.diagnosis.excess import excess_by_sensor, removed_share
+from defras_bt.diagnosis.findings import Findings
+from defras_bt.diagnosis.portrait import portrait
+from defras_bt.diagnosis.verdict import Cause, Estimate, Gain, Verdict, VerdictName
+from defras_sim.geometry import Floats
+
+
+def diagnosis_of(found: Findings) -> Diagnosis:
+    """Everything that was found, with the verdict that follows from it."""
+    search = found.search
+    samples = search.samples
+    before = search.held_out(found.base, search.noise).residual
+    after = search.held_out(search.fit, search.noise).residual
+    verdict = _verdict(found, before, after)
+    folds = [
+        removed_share(
+            np.where(samples.fold == fold, before, np.nan),
+            np.where(samples.fold == fold, after, np.nan),
+            samples,
+        )
+        for fold in np.unique(samples.fold)
+    ]
+    return Diagnosis(
+        verdict=verdict,
+        samples=samples,
+        candidates=search.sketch.candidates,
+        base=found.base.model,
+        model=search.fit.model,
+        residual_before=found.base.residual,
+        residual_after=search.fit.residual,
+        held_out_before=before,
+        held_out_after=after,
+        fold_gain=np.array([np.nan if gain is None else gain for gain in folds]),
+        excess=excess_by_sensor(before, after, samples),
+        portrait=portrait(found.base.residual, samples),
+        portrait_after=portrait(search.fit.residual, samples),
+        ranking=search.ranking,
+        pairs=search.pairs,
+        rounds=tuple(search.rounds),
+        confounding=found.confounding,
+        partial=search.accepted() if verdict.verdict == "outside" else (),
+        unseen=found.unseen,
+        residual_calls=search.counted.calls,
+        complete=found.complete,
+    )
+
+
+def _verdict(found: Findings, before: Floats, after: Floats) -> Verdict:
+    search = found.search
+    accepted = search.accepted()
+    removed = removed_share(before, after, search.samples)
+    left = None if removed is None else 1.0 - removed
+    too_much = not accepted or (left is not None and left > search.settings.outside_share)
+    outside = bool(found.left.sensors) and too_much
+    # Other places of the same effect are not another cause.
+    ambiguous = {
+        key: [r for r in found.rivals.get(key, ()) if _effect(r) != _effect(key)]
+        for key in accepted
+    }
+    name: VerdictName = "nothing"
+    if outside:
+        name = "outside"
+    elif any(ambiguous.values()):
+        name = "set"
+    elif accepted:
+        name = "named"
+    together = dict.fromkeys(
+        _effect(key) for cause, others in ambiguous.items() if others for key in (cause, *others)
+    )
+    return Verdict(
+        verdict=name,
+        causes=() if outside else tuple(_cause(found, key) for key in accepted),
+        ambiguous=() if outside else tuple(together),
+        excluded={} if outside else found.excluded,
+        gain=Gain(
+            removed if accepted else None,
+            found.further.get("beyond_range"),
+            found.further.get("new_grasp"),
+        ),
+        unexplained_share=left,
+        warnings=_warnings(found, outside),
+    )
+
+
+def _effect(key: str) -> str:
+    return key.split("@")[0]
+
+
+def _cause(found: Findings, key: str) -> Cause:
+    search = found.search
+    candidate = search.sketch.candidate(key)
+    estimates = dict(found.estimates.get(key, {}))
+    for name, value in search.fit.model[candidate.effect.name].items():
+        # Fixed parameters that belong to it, as the place of a patch.
+        parameter = next((p for p in candidate.effect.parameters if p.name == name), None)
+        others = [c for c in search.fit.candidates if c.effect is candidate.effect]
+        if name not in estimates and parameter is not None and len(others) == 1:
+            estimates[name] = Estimate(float(value), parameter.unit, (float(value), float(value)))
+    return Cause(
+        candidate.effect.name,
+        candidate.site,
+        estimates,
+        _gain_alone(found, key),
+        found.rivals.get(key, ()),
+    )
+
+
+def _gain_alone(found: Findings, key: str) -> float:
+    """Share of the first excess that the step to ``key`` removed, held out."""
+    search = found.search
+    models = [found.base, *search.history]
+    residuals = [search.held_out(fit, search.noise).residual for fit in models]
+    for index in range(1, len(models)):
+        if key in models[index].keys and key not in models[index - 1].keys:
+            with_it = removed_share(residuals[0], residuals[index], search.samples)
+            before = removed_share(residuals[0], residuals[index - 1], search.samples)
+            return float((with_it or 0.0) - (before or 0.0))
+    return 0.0
+
+
+def _warnings(found: Findings, outside: bool) -> tuple[str, ...]:
+    sentences = []
+    if not found.complete:
+        sentences.append("The diagnosis was interrupted; what it had found by then is reported.")
+    if outside:
+        where = ", ".join(found.left.sensors)
+        sentences.append(f"Something that no known effect explains is left in: {where}.")
+        if found.search.accepted():
+            names = ", ".join(found.search.accepted())
+            sentences.append(f"A part of it looks like {names}, too little to be called the cause.")
+    for key in found.unseen:
+        sentences.append(
+            f"{key} changes nothing that was measured in these motions, so nothing can be said "
+            "about it."
+        )
+    for name, gain in found.further.items():
+        if gain is not None and gain < 0.0:
+            place = name.replace("_", " ")
+            sentences.append(f"The extended model is worse than the plain one {place}.")
+    return tuple(sentences)
