@@ -19,6 +19,8 @@ def exclusions(search: Search) -> tuple[dict[str, Excluded], tuple[str, ...]]:
     """By candidate key: the strength that would have shown in 95 % of cases, for those within
     whose bounds there is one. Also the candidates that change nothing observable."""
     noise, now, left = noise_beside(search)
+    if not now.of_option:
+        return {}, ()
     known = known_noise(now, noise, left, search.samples, search.layout, search.rng)
     filled = np.nan_to_num(search.fit.residual)[:, None]
     found = whitened_products(now, known.middle, filled)
