@@ -11,6 +11,7 @@ from defras_bt.benchmark.files import write_benchmark
 from defras_bt.benchmark.planner import planning_times
 from defras_bt.cli.benchmark_executive import executive
 from defras_bt.cli.benchmark_faults import faults
+from defras_bt.cli.benchmark_monitor import monitor
 from defras_bt.cli.benchmark_retraction import table1, table2
 from defras_bt.cli.benchmark_tissue import tissue
 from defras_bt.cli.files import find_scene, folder_for
@@ -27,6 +28,7 @@ app.command("executive")(executive)
 app.command("table1")(table1)
 app.command("table2")(table2)
 app.command("faults")(faults)
+app.command("monitor")(monitor)
 app.command("tissue")(tissue)
 
 
