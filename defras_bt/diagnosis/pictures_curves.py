@@ -45,5 +45,6 @@ def curves_svg(comparisons: Sequence[Comparison], *, extended: bool) -> str:
             axis.set_ylabel(f"{each.y_name} [{y_unit or '1'}]")
         for axis in axes[len(shown) :]:
             axis.axis("off")
-        axes[0].legend(loc="best")
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
         return svg_text(figure, "Measured and predicted")

@@ -54,7 +54,7 @@ def rows(samples: Samples) -> tuple[Row, ...]:
             for i in members:
                 channel = samples.channels[i]
                 found.append(Row(channel.name, channel.unit, (i,), channel.noise_sd))
-    return tuple(found[:_MOST_ROWS])
+    return tuple(sorted(found, key=lambda row: row.channels[0])[:_MOST_ROWS])
 
 
 def curve(samples: Samples, row: Row, trajectory: int, residual: Floats) -> tuple[Floats, Floats]:
@@ -141,12 +141,17 @@ def _limits(axis: Axes, row: Row, factor: float) -> None:
 
 
 def phase_spans(samples: Samples, trajectory: int) -> list[tuple[float, float, str]]:
-    """Begin, end and name of every phase of a trajectory, in order; without gaps between."""
+    """Begin, end and name of every phase of a trajectory, in order; without gaps between.
+
+    None where each channel has phases of its own, as joints that turn round at their own times.
+    """
     chosen = samples.trajectory == trajectory
-    times, first = np.unique(samples.time_s[chosen], return_index=True)
+    times, first, at = np.unique(samples.time_s[chosen], return_index=True, return_inverse=True)
     if not len(times):
         return []
     phase: Integers = samples.phase[chosen][first]
+    if np.any(samples.phase[chosen] != phase[at]):
+        return []
     starts = np.flatnonzero(np.diff(phase, prepend=phase[0] - 1))
     ends = [*times[starts[1:]], times[-1]]
     return [

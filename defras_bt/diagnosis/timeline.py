@@ -106,15 +106,19 @@ def _log_phases(
         static=True,
     )
     for index, name in enumerate(names):
-        spans = phase_spans(diagnosis.samples, index)
-        for begin_s, _, phase in spans:
-            stream.set_time("time", duration=begin_s + starts_s[name])
-            stream.log("motion/phase", rr.StateChange(state=phase))
-            stream.log("motion/recording", rr.StateChange(state=name))
-        if spans:
-            stream.set_time("time", duration=spans[-1][1] + starts_s[name])
-            stream.log("motion/phase", rr.StateChange(state=""))
-            stream.log("motion/recording", rr.StateChange(state=""))
+        its_s = diagnosis.samples.time_s[diagnosis.samples.trajectory == index]
+        if not len(its_s):
+            continue
+        for lane, spans in (
+            ("phase", phase_spans(diagnosis.samples, index)),
+            ("recording", [(float(its_s.min()), float(its_s.max()), name)]),
+        ):
+            for begin_s, _, state in spans:
+                stream.set_time("time", duration=begin_s + starts_s[name])
+                stream.log(f"motion/{lane}", rr.StateChange(state=state))
+            if spans:
+                stream.set_time("time", duration=spans[-1][1] + starts_s[name])
+                stream.log(f"motion/{lane}", rr.StateChange(state=""))
 
 
 def _log_row(
