@@ -21,12 +21,13 @@ from defras_bt.diagnosis.tables_quality import (
     scatter,
     suspected_unit,
 )
-from defras_bt.diagnosis.twins.arm_candidates import joint_candidates, play_starts
+from defras_bt.diagnosis.twins.arm_candidates import joint_candidates, lag_starts, play_starts
 from defras_bt.diagnosis.twins.table_problem import TableProblem, fold_of_rows
 from defras_sim.arm.true_joints import true_joints
 from defras_sim.effects.arm_joints import JOINTS, JointName, unit
 from defras_sim.effects.effect import Extension, Values
 from defras_sim.effects.joint_play import EFFECT as JOINT_PLAY
+from defras_sim.effects.servo_lag import EFFECT as SERVO_LAG
 from defras_sim.geometry import Floats
 
 PHASES = ("still", "rising", "falling")
@@ -92,9 +93,11 @@ class ArmProblem(TableProblem):
     def starts(
         self, model: Extension, candidate: Candidate
     ) -> Sequence[tuple[Values, Sequence[Values]]]:
-        if candidate.effect.name != JOINT_PLAY.name:
-            return ()
-        return play_starts(self._setpoints, candidate)
+        if candidate.effect.name == JOINT_PLAY.name:
+            return play_starts(self._setpoints, candidate)
+        if candidate.effect.name == SERVO_LAG.name:
+            return lag_starts(candidate)
+        return ()
 
     def _compared(self, joints: Sequence[Floats]) -> Floats:
         """The numbers that are compared, of each run's (rows, 6): by run, joint, time."""
@@ -161,7 +164,7 @@ def _samples(runs: Sequence[JointRun], joints: Sequence[int]) -> Samples:
     """Labels of what is compared, by run, joint, time."""
     noise_sd = np.sqrt(np.nanmean([run.noise_sd**2 for run in runs], axis=0))
     channels = tuple(
-        Channel(JOINTS[i], "joints", unit(JOINTS[i]), float(noise_sd[i]), _FLOORS[JOINTS[i]])
+        Channel(JOINTS[i], JOINTS[i], unit(JOINTS[i]), float(noise_sd[i]), _FLOORS[JOINTS[i]])
         for i in joints
     )
     folds = fold_of_rows([len(run.time_s) for run in runs])

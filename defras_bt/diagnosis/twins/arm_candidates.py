@@ -20,6 +20,11 @@ from defras_sim.geometry import Floats
 _WIDTHS = np.geomspace(0.01, 0.6, 14)
 """Of play that is looked for, as shares of the range of the joint: each 1.4 times the last."""
 
+_LAGS_S = np.geomspace(0.01, 0.32, 11)
+"""That are looked for, each 1.4 times the last. Between rows set-points are taken as straight: so
+late by half a row is late by what that row brings, and no derivative at zero tells what 50 ms do.
+"""
+
 _ARM: tuple[JointName, ...] = tuple(q for q in JOINTS if q not in WRIST)
 
 
@@ -50,17 +55,24 @@ def joint_candidates(
 def play_starts(
     setpoints: Sequence[Floats], candidate: Candidate
 ) -> list[tuple[Values, list[Values]]]:
-    """Widths of play to try; from each the joints go off linearly with what is lost of it."""
+    """Widths of play to try: as a free gap, and with any share of what is lost of the width."""
     joint = next(q for q in JOINTS if q == candidate.site)
     width_range = _ranges(setpoints)[JOINTS.index(joint)]
     width = candidate.free[0]
     shares = [p.name for p in candidate.free[1:]]
-    nothing = dict.fromkeys(shares, 0.0)
-    return [
-        ({width.name: float(w), **nothing}, [{share: 1.0} for share in shares])
-        for w in _WIDTHS * width_range
-        if width.lower < w <= width.upper
-    ]
+    starts: list[tuple[Values, list[Values]]] = []
+    for tried in _WIDTHS * width_range:
+        w = float(tried)
+        if width.lower < w <= width.upper:
+            starts.append(({}, [{width.name: w}]))
+            nothing = dict.fromkeys(shares, 0.0)
+            starts.append(({width.name: w, **nothing}, [{share: 1.0} for share in shares]))
+    return starts
+
+
+def lag_starts(candidate: Candidate) -> list[tuple[Values, list[Values]]]:
+    """Lags to try."""
+    return [({}, [{candidate.free[0].name: float(lag_s)}]) for lag_s in _LAGS_S]
 
 
 def _play(joint: JointName, measured: Sequence[JointName]) -> Candidate:
