@@ -13,6 +13,7 @@ from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.monitoring.warning import WarningMonitor
 from defras_bt.recording.operator_state import NOBODY, Mode, OperatorState
 from defras_bt.sensing.arms import ArmPlausibility
+from defras_bt.sensing.cloud import Workspace
 from defras_bt.sensing.freshness import stale
 from defras_bt.sensing.latest import LatestReadings
 from defras_bt.sensing.sense import SensedObservation, sense
@@ -42,13 +43,15 @@ class Perception:
         self._latest = LatestReadings(twin.scene)
         self._arms = ArmPlausibility(twin.scene)
         self._time_s = -np.inf
+        # Learning changes what is believed to hold the tissue, never its shape.
+        self._workspace = Workspace.of(twin.scene)
 
     def update(
         self, tick: int, observation: Observation, operator: OperatorState = NOBODY
     ) -> TickInputs:
         """Everything the tree may know at this tick."""
         scene, board = self._twin.scene, self._board
-        sensed = sense(self._latest.update(observation), scene)
+        sensed = sense(self._latest.update(observation), scene, workspace=self._workspace)
         missing = {
             **self._standstill(sensed.time_s),
             **self._arms.faults(sensed, driven_by_hand=operator.mode is Mode.TAKEN_OVER),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import dist
 
 import numpy as np
 
@@ -131,6 +132,6 @@ class KeyframeBuffer:
 def _gap_m(one: Keyframe, other: Keyframe) -> float:
     """Largest way of a tip between two frames."""
     return max(
-        float(np.linalg.norm(one.tips[arm].position_m - other.tips[arm].position_m))
+        dist(one.tips[arm].position_m.tolist(), other.tips[arm].position_m.tolist())
         for arm in one.tips
     )

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
-
-import numpy as np
+from math import dist, isfinite
 
 from defras_bt.sensing.dead_reckoning import STRAYED_M, DeadReckoning
 from defras_sim.geometry import Floats
@@ -101,9 +100,8 @@ class ArmPlausibility:
 
 def _is_sound(arm: ArmObservation) -> bool:
     poses = (arm.tissue_from_tip, arm.setpoint_tissue_from_tip)
-    return bool(all(np.isfinite(pose.position_m).all() for pose in poses)) and bool(
-        np.isfinite(arm.stamp_s)
-    )
+    numbers = (number for pose in poses for number in pose.position_m.tolist())
+    return isfinite(arm.stamp_s) and all(map(isfinite, numbers))
 
 
 def _moved_m(one: ArmObservation, other: ArmObservation) -> float:
@@ -117,4 +115,4 @@ def _moved_m(one: ArmObservation, other: ArmObservation) -> float:
 
 
 def _distance_m(one: Floats, other: Floats) -> float:
-    return float(np.linalg.norm(one - other))
+    return dist(one.tolist(), other.tolist())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 
@@ -33,8 +34,8 @@ class _Leg:
 
     def at(self, time_s: float) -> tuple[Floats, float]:
         """Displacement (3,) and length of the way, both in metres, up to ``time_s``."""
-        share = float(np.clip((time_s - self.start_s) / self.tick_s, 0.0, 1.0))
-        way_m = share * float(np.linalg.norm(self.step_m))
+        share = min(max((time_s - self.start_s) / self.tick_s, 0.0), 1.0)
+        way_m = share * hypot(*self.step_m.tolist())
         return self.before_m + share * self.step_m, self.way_before_m + way_m
 
 
@@ -52,7 +53,7 @@ class DeadReckoning:
 
     def sent(self, time_s: float, linear_m_s: Floats, tick_s: float) -> None:
         """The tip is told to go at ``linear_m_s`` (3,) from ``time_s`` on, for ``tick_s``."""
-        if not np.any(linear_m_s):
+        if not linear_m_s.any():
             return
         before_m, way_m, start_s = np.zeros(3), 0.0, time_s
         if self._legs:
@@ -81,7 +82,7 @@ class DeadReckoning:
         self._way_m = max(way_m, self._way_m)
         astray_m = shortened(gone_m - self._start_m, allowed_m)
         self._start_m = gone_m - astray_m
-        return float(np.linalg.norm(astray_m))
+        return hypot(*astray_m.tolist())
 
     def _sent_until(self, time_s: float) -> tuple[Floats, float]:
         for leg in reversed(self._legs):
@@ -96,5 +97,5 @@ def shortened(vector_m: Floats, by_m: float) -> Floats:
     >>> shortened(np.array([0.0, 0.0, 4.0]), 1.0)
     array([0., 0., 3.])
     """
-    length_m = float(np.linalg.norm(vector_m))
+    length_m = hypot(*vector_m.tolist())
     return vector_m * (1.0 - by_m / length_m) if length_m > by_m else np.zeros(3)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite, isinf
 
-import numpy as np
-
+from defras_bt.sensing.usable import all_finite
 from defras_sim.scene import Scene
 from defras_sim.worlds.protocol import ArmObservation, Observation
 
@@ -23,10 +23,8 @@ def ages_s(observation: Observation, scene: Scene) -> Mapping[str, float]:
         name: _arm_age_s(observation.arms.get(name), now) for name in scene.arms
     }
     cloud, visibility = observation.cloud, observation.roi_visibility
-    sound_cloud = (
-        cloud is not None and len(cloud.points_m) > 0 and bool(np.all(np.isfinite(cloud.points_m)))
-    )
-    sound_visibility = visibility is not None and bool(np.isfinite(visibility))
+    sound_cloud = cloud is not None and len(cloud.points_m) > 0 and all_finite(cloud.points_m)
+    sound_visibility = visibility is not None and isfinite(visibility)
     return {
         **arms,
         "cloud": age_s(cloud.stamp_s if cloud is not None and sound_cloud else None, now),
@@ -42,7 +40,7 @@ def stale(observation: Observation, scene: Scene) -> Mapping[str, str]:
     return {
         name: (
             f"{name} is missing, not finite, or stamped in the future"
-            if np.isinf(age)
+            if isinf(age)
             else f"{name} is {age:.2f} s old; at most {limit:g} s is allowed"
         )
         for name, age in ages_s(observation, scene).items()
@@ -52,7 +50,7 @@ def stale(observation: Observation, scene: Scene) -> Mapping[str, str]:
 
 def age_s(stamp_s: float | None, now_s: float) -> float:
     """Seconds since ``stamp_s``; infinite for None, NaN and the future: unknown is too old."""
-    if stamp_s is None or not np.isfinite(stamp_s) or not np.isfinite(now_s):
+    if stamp_s is None or not isfinite(stamp_s) or not isfinite(now_s):
         return float("inf")
     age = now_s - stamp_s
     return float("inf") if age < -_ROUNDING_S else max(age, 0.0)
@@ -61,9 +59,9 @@ def age_s(stamp_s: float | None, now_s: float) -> float:
 def _arm_age_s(arm: ArmObservation | None, now_s: float) -> float:
     if arm is None:
         return float("inf")
-    joints = np.zeros(0) if arm.joints is None else arm.joints
-    numbers = [joints, np.array([arm.jaw_rad])]
+    numbers = [arm.jaw_rad]
     for pose in (arm.tissue_from_tip, arm.setpoint_tissue_from_tip):
-        numbers += [pose.position_m, pose.rotation.ravel()]
-    sound = bool(np.all(np.isfinite(np.concatenate(numbers))))
-    return age_s(arm.stamp_s if sound else None, now_s)
+        numbers += [*pose.position_m.tolist(), *pose.rotation.ravel().tolist()]
+    if arm.joints is not None:
+        numbers += arm.joints.tolist()
+    return age_s(arm.stamp_s if all(map(isfinite, numbers)) else None, now_s)

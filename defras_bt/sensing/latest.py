@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import isinf
 from typing import TypeVar
 
 import numpy as np
@@ -53,7 +54,7 @@ class LatestReadings:
         )
 
     def _newer(self, name: str, reading: AnyReading, now_s: float) -> AnyReading:
-        if np.isinf(age_s(reading.stamp_s, now_s)):
+        if isinf(age_s(reading.stamp_s, now_s)):
             return reading
         last = self._newest.get(name)
         if isinstance(last, type(reading)) and (
@@ -65,7 +66,7 @@ class LatestReadings:
 
     def _newer_visibility(self, observation: Observation) -> tuple[float | None, float | None]:
         share, stamp_s = observation.roi_visibility, observation.roi_visibility_stamp_s
-        if share is None or stamp_s is None or np.isinf(age_s(stamp_s, observation.time_s)):
+        if share is None or stamp_s is None or isinf(age_s(stamp_s, observation.time_s)):
             return share, stamp_s
         if self._visibility is None or stamp_s >= self._visibility[1]:
             self._visibility = (share, stamp_s)

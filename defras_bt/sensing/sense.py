@@ -9,6 +9,7 @@ import numpy as np
 from defras_bt.sensing.cloud import Workspace, tissue_points_m
 from defras_bt.sensing.colours import DEFAULT_COLOURS, ColourCalibration
 from defras_bt.sensing.roi import roi_visibility
+from defras_bt.sensing.usable import usable_points
 from defras_sim.scene import Scene
 from defras_sim.worlds.protocol import Observation, PointCloud
 
@@ -29,17 +30,23 @@ class SensedObservation(Observation):
 
 
 def sense(
-    observation: Observation, scene: Scene, colours: ColourCalibration = DEFAULT_COLOURS
+    observation: Observation,
+    scene: Scene,
+    colours: ColourCalibration = DEFAULT_COLOURS,
+    workspace: Workspace | None = None,
 ) -> SensedObservation:
     """Fill in cloud and region visibility; what a world delivers ready-made passes through.
 
     Bad data never raises: it ends up as None with a sentence in ``faults``, and whoever needs the
     reading has to treat None as a tripped guard. What was sensed already, as in a recording, stays.
+    ``workspace`` is that of the scene, for those who sense every tick.
     """
     if isinstance(observation, SensedObservation):
         return observation
     share, stamp_s, unseen = _visibility(observation, scene, colours)
-    cloud, dropped, unmeasured = _cloud(observation, scene, colours)
+    cloud, dropped, unmeasured = _cloud(
+        observation, scene, colours, workspace or Workspace.of(scene)
+    )
     return SensedObservation(
         time_s=observation.time_s,
         arms=observation.arms,
@@ -54,7 +61,7 @@ def sense(
 
 
 def _cloud(
-    observation: Observation, scene: Scene, colours: ColourCalibration
+    observation: Observation, scene: Scene, colours: ColourCalibration, workspace: Workspace
 ) -> tuple[PointCloud | None, int, str]:
     """The cloud, how many points were not finite, and why there is no cloud ("" if there is)."""
     cloud, image = observation.cloud, observation.depth_image
@@ -66,13 +73,11 @@ def _cloud(
         except ValueError as fault:
             return None, 0, f"no cloud: {fault}"
     assert cloud is not None
-    # Depth cameras measure, and recordings keep, no more than single precision.
-    with np.errstate(over="ignore"):  # what is too large for that is dropped as infinite
-        points = np.asarray(cloud.points_m, np.float32).astype(np.float64)
+    points = np.asarray(cloud.points_m)
     if points.ndim != 2 or points.shape[1] != 3:
         return None, 0, f"no cloud: points of shape {points.shape}, not (n, 3)"
-    finite = np.isfinite(points).all(axis=1)
-    usable = int(np.count_nonzero(finite))
+    measured = np.ascontiguousarray(points, np.float64)
+    possible, usable = usable_points(measured, workspace.low_m, workspace.high_m)
     dropped = len(points) - usable
     if usable < MIN_CLOUD_POINTS:
         reason = (
@@ -80,15 +85,14 @@ def _cloud(
             f"at least {MIN_CLOUD_POINTS} are needed"
         )
         return None, dropped, reason
-    possible = finite & Workspace.of(scene).holds(points)
-    share = np.count_nonzero(possible) / usable
+    share = len(possible) / usable
     if share < 1 / 2:
         reason = (
             f"no cloud: only {share:.0%} of its points lie where tissue can be; it should be in "
             "metres and in the tissue frame"
         )
         return None, dropped, reason
-    return PointCloud(cloud.stamp_s, points[possible]), dropped, ""
+    return PointCloud(cloud.stamp_s, possible), dropped, ""
 
 
 def _visibility(

@@ -35,7 +35,7 @@ class Pose:
     def moved(self, linear_m: Floats, angular_rad: Floats | None = None) -> Pose:
         """Translate, and rotate about the pose's own origin, both expressed in the parent frame."""
         rotation = self.rotation
-        if angular_rad is not None and np.any(angular_rad):
+        if angular_rad is not None and angular_rad.any():
             rotation = Rotation.from_rotvec(angular_rad).as_matrix() @ rotation
         return Pose(self.position_m + linear_m, rotation)
 

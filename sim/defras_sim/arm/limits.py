@@ -23,6 +23,8 @@ from defras_sim.geometry import Floats, Pose
 
 LOW = JOINT_LOW.copy()
 LOW[INSERTION] = SHAFT_BEYOND_RCM_M
+# Plain numbers: of six joints, arrays would be slower.
+_LOW, _HIGH, _SPEED = LOW.tolist(), JOINT_HIGH.tolist(), JOINT_SPEED.tolist()
 _ROLL = JOINT_NAMES.index("roll")
 _HALVINGS = 10
 
@@ -81,22 +83,23 @@ class ArmLimits:
 
 def _broken(start: Floats, end: Floats, time_s: float) -> str:
     """Which limit a motion from joints ``start`` (6,) to ``end`` (6,) breaks; "" if none."""
-    change = end - start
-    change[_ROLL] = turned_back(float(change[_ROLL]))
-    outward = ((end > JOINT_HIGH) & (change > 0)) | ((end < LOW) & (change < 0))
-    if outward.any():
-        joint = int(np.argmax(outward))
-        unit, scale = ("mm", 1e3) if joint == INSERTION else ("degrees", 180 / np.pi)
-        return (
-            f"{JOINT_NAMES[joint]} would go to {end[joint] * scale:.1f} {unit}, allowed are "
-            f"{LOW[joint] * scale:.1f} to {JOINT_HIGH[joint] * scale:.1f}"
-        )
-    fast = np.abs(change) > JOINT_SPEED * time_s
-    if fast.any():
-        joint = int(np.argmax(fast))
-        unit = "m/s" if joint == INSERTION else "rad/s"
-        return (
-            f"{JOINT_NAMES[joint]} would move at {abs(change[joint]) / time_s:.2f} {unit}, "
-            f"allowed are {JOINT_SPEED[joint]:.2f}"
-        )
+    ends = end.tolist()
+    changes = [after - before for before, after in zip(start.tolist(), ends, strict=True)]
+    changes[_ROLL] = turned_back(changes[_ROLL])
+    for joint, (change, after, low, high) in enumerate(
+        zip(changes, ends, _LOW, _HIGH, strict=True)
+    ):
+        if (after > high and change > 0.0) or (after < low and change < 0.0):
+            unit, scale = ("mm", 1e3) if joint == INSERTION else ("degrees", 180 / np.pi)
+            return (
+                f"{JOINT_NAMES[joint]} would go to {after * scale:.1f} {unit}, allowed are "
+                f"{low * scale:.1f} to {high * scale:.1f}"
+            )
+    for joint, (change, speed) in enumerate(zip(changes, _SPEED, strict=True)):
+        if abs(change) > speed * time_s:
+            unit = "m/s" if joint == INSERTION else "rad/s"
+            return (
+                f"{JOINT_NAMES[joint]} would move at {abs(change) / time_s:.2f} {unit}, "
+                f"allowed are {speed:.2f}"
+            )
     return ""
