@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import hypot, isfinite, isnan
 
 import numpy as np
 
@@ -125,18 +126,18 @@ class CommandGate:
             observed = observation.arms.get(name)
             if observed is None or name not in self._arms:
                 faults.append(f"{name} is not an arm of this set-up")
-            elif np.shape(command.linear_m_s) != (3,) or np.shape(command.angular_rad_s) != (3,):
+            elif not (_is_vector(command.linear_m_s) and _is_vector(command.angular_rad_s)):
                 faults.append(f"the command for {name} has not three components")
             elif not command.is_finite:
                 faults.append(f"the command for {name} is not a number")
-            elif not np.all(np.isfinite(observed.setpoint_tissue_from_tip.position_m)):
+            elif not all(map(isfinite, observed.setpoint_tissue_from_tip.position_m.tolist())):
                 faults.append(f"the set-point of {name} is not a number")
         return faults
 
     def _tissue_trips(self, inputs: TickInputs) -> list[str]:
         """What speaks against moving tissue, but not against letting it go."""
         reasons = []
-        if np.isnan(inputs.force_n):
+        if isnan(inputs.force_n):
             reasons.append("the force estimate is missing")
         elif inputs.force_over_s >= FORCE_PATIENCE_S:
             reasons.append(
@@ -145,7 +146,7 @@ class CommandGate:
             )
         if self._metric is not None:
             reading = inputs.reading
-            if reading is None or np.isnan(reading.mu_m[self._metric]):
+            if reading is None or isnan(reading.mu_m[self._metric]):
                 reasons.append("the discrepancy is unknown")
             elif reading.warning_state[self._metric] >= 2:
                 reasons.append(f"the warning state is {reading.warning_state[self._metric]}")
@@ -158,11 +159,8 @@ class CommandGate:
         tick_s, tip = self._scene.tick_s, observed.setpoint_tissue_from_tip
         start = tip.position_m
         # Outside the workspace only motion back into it is let through.
-        end = np.clip(
-            start + command.linear_m_s * tick_s,
-            np.minimum(start, self._low_m),
-            np.maximum(start, self._high_m),
-        )
+        low_m, high_m = np.minimum(start, self._low_m), np.maximum(start, self._high_m)
+        end = np.minimum(np.maximum(start + command.linear_m_s * tick_s, low_m), high_m)
         linear_m, angular_rad = end - start, command.angular_rad_s * tick_s
         if not (linear_m.any() or angular_rad.any()):
             return ArmCommand(jaw_rad=command.jaw_rad), ""
@@ -180,8 +178,7 @@ def _blindness(inputs: TickInputs) -> list[str]:
 def _ownerless(proposed: Proposal) -> list[str]:
     """Motion may only come from an action that goes on: not from one that a guard has ended."""
     moving = any(
-        np.any(arm.linear_m_s) or np.any(arm.angular_rad_s)
-        for arm in proposed.command.arms.values()
+        arm.linear_m_s.any() or arm.angular_rad_s.any() for arm in proposed.command.arms.values()
     )
     if moving and not proposed.acting:
         return ["motion was proposed, but no action was under way when the tick ended"]
@@ -196,17 +193,21 @@ def _slowed(command: ArmCommand, speed_m_s: float, rate: float) -> ArmCommand:
     )
 
 
+def _is_vector(value: object) -> bool:
+    return isinstance(value, np.ndarray) and value.shape == (3,)
+
+
 def _jaw(command: ArmCommand) -> float | None:
     if command.jaw_rad is None:
         return None
-    return float(np.clip(command.jaw_rad, JAW_CLOSED_RAD, JAW_OPEN_RAD))
+    return min(max(float(command.jaw_rad), JAW_CLOSED_RAD), JAW_OPEN_RAD)
 
 
 def _clipped(vector: Floats, limit: float) -> Floats:
     """``vector`` (3,) of at most ``limit``, even where its own square is too large a number."""
-    largest = float(np.abs(vector).max())
+    largest = max(map(abs, vector.tolist()))
     if largest == 0.0:
         return vector
     shape = vector / largest
-    length = float(np.linalg.norm(shape))
+    length = hypot(*shape.tolist())
     return vector if largest <= limit / length else shape * (limit / length)

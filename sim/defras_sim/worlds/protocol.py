@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Protocol
 
 import numpy as np
@@ -91,7 +92,8 @@ class ArmCommand:
     def is_finite(self) -> bool:
         """Whether every number in it is one."""
         jaw_rad = 0.0 if self.jaw_rad is None else self.jaw_rad
-        return bool(np.isfinite([*self.linear_m_s, *self.angular_rad_s, jaw_rad]).all())
+        numbers = [*self.linear_m_s.tolist(), *self.angular_rad_s.tolist(), jaw_rad]
+        return all(map(isfinite, numbers))
 
 
 @dataclass(frozen=True)
