@@ -18,6 +18,7 @@ from defras_bt.diagnosis.columns import Sketch
 from defras_bt.diagnosis.diagnosis import Ranked, RankedPair, Round, Trial
 from defras_bt.diagnosis.excess import is_practical
 from defras_bt.diagnosis.fitting import CountedProblem, Fit, conflicts, extend, without
+from defras_bt.diagnosis.held_out import Products
 from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise import Noise, estimate_noise
 from defras_bt.diagnosis.noise_bias import KnownNoise
@@ -133,7 +134,7 @@ def _forward(search: Search, told: Progress) -> bool:
         search.pairs = ranked_pairs(now, found, best)
     told(f"round {number}: what chance reaches", 0.2)
     limit = _threshold(search, now, known, left)
-    hopeful = _hopeful(search, rows, limit)
+    hopeful = _hopeful(search, _worth_naming(search, now, found, rows), limit)
     trials, fits = [], {}
     for index, row in enumerate(hopeful):
         told(f"round {number}: fitting {row.key}", 0.3 + 0.7 * index / len(hopeful))
@@ -171,6 +172,27 @@ def _forward(search: Search, told: Progress) -> bool:
 def _threshold(search: Search, now: Board, known: KnownNoise, left: Floats) -> float:
     chance = maxima(now, known, left, search.settings.surrogates, search.rng)
     return max(float(np.quantile(chance, 1.0 - search.settings.false_alarm)), 0.0)
+
+
+def _worth_naming(
+    search: Search, now: Board, found: Products, rows: tuple[Ranked, ...]
+) -> tuple[Ranked, ...]:
+    """Candidates whose change would be worth naming by the linearised model; all, where none is.
+
+    What is clearly seen but of no practical size must not stand in the way of what is both.
+    """
+    scores = score(now, found)
+    residual = search.fit.residual
+    worth = []
+    for row in rows:
+        if not row.visible:
+            continue
+        chosen, amplitudes = start_of(now, found, row.key, int(scores.option[row.key][0]))
+        change = chosen.columns @ amplitudes
+        share = search.settings.relative_gain
+        if is_practical(change, residual, residual - change, search.samples, share):
+            worth.append(row)
+    return tuple(worth) or rows
 
 
 def _hopeful(search: Search, rows: tuple[Ranked, ...], limit: float) -> list[Ranked]:
