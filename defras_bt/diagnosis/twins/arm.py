@@ -36,9 +36,8 @@ PHASES = ("still", "rising", "falling")
 _LARGEST_ANGLE_RAD = 6.5
 _LARGEST_INSERTION_M = 0.5
 
-# What moves the tip by 0.02 mm interests nobody: by lever arms of 0.2 m about the remote centre
-# and 10 mm about the wrist.
-_FLOORS = {"q1": 1e-4, "q2": 1e-4, "q3": 2e-5, "q4": 2e-3, "q5": 2e-3, "q6": 2e-3}
+_FLOOR = {"rad": 5e-4, "m": 5e-5}
+"""Half a milliradian is 0.1 mm at the tip of a far inserted arm."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +163,7 @@ def _samples(runs: Sequence[JointRun], joints: Sequence[int]) -> Samples:
     """Labels of what is compared, by run, joint, time."""
     noise_sd = np.sqrt(np.nanmean([run.noise_sd**2 for run in runs], axis=0))
     channels = tuple(
-        Channel(JOINTS[i], JOINTS[i], unit(JOINTS[i]), float(noise_sd[i]), _FLOORS[JOINTS[i]])
+        Channel(JOINTS[i], JOINTS[i], unit(JOINTS[i]), float(noise_sd[i]), _FLOOR[unit(JOINTS[i])])
         for i in joints
     )
     folds = fold_of_rows([len(run.time_s) for run in runs])
