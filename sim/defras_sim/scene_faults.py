@@ -50,7 +50,7 @@ def scene_faults(scene: Scene) -> Iterator[SceneFault]:
     yield from _weight_faults(scene)
     yield from _mesh_faults(scene)
     yield from _setup_faults(scene)
-    yield from adoption_faults(scene.model)
+    yield from adoption_faults(scene)
     yield from _advice_faults(scene)
 
 

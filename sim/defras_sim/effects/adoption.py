@@ -11,15 +11,15 @@ from defras_sim.effects.effect import Effect
 from defras_sim.yaml_source import Location
 
 if TYPE_CHECKING:
-    from defras_sim.scene_parts import ModelExtension
+    from defras_sim.scene import Scene
 
 
-def adoption_faults(model: ModelExtension) -> Iterator[tuple[Location, str]]:
-    """Where in the scene file an effect cannot be adopted, and what would be valid."""
+def adoption_faults(scene: Scene) -> Iterator[tuple[Location, str]]:
+    """Where in its file ``scene`` adopts an effect that it cannot, and what would be valid."""
     known = {effect.name: effect for effect in library.effects()}
     usable = sorted(name for name, effect in known.items() if "tissue" in effect.twins)
     seen: set[str] = set()
-    for i, adopted in enumerate(model.effects):
+    for i, adopted in enumerate(scene.model.effects):
         where: Location = ("model", "effects", i)
         path, name = f"model.effects.{i}", adopted.effect
         if name not in known:
@@ -38,7 +38,8 @@ def adoption_faults(model: ModelExtension) -> Iterator[tuple[Location, str]]:
             message = f"{path}.effect: {name} is adopted twice; give all its parameters once"
             yield (*where, "effect"), message
         else:
-            yield from _value_faults(where, path, known[name], adopted.values)
+            faults = list(_value_faults(where, path, known[name], adopted.values))
+            yield from faults or _tissue_faults(where, path, known[name], adopted.values, scene)
         seen.add(name)
 
 
@@ -59,6 +60,20 @@ def _value_faults(
                 f"{path}.{name}: {value:g} is out of bounds; {p.meaning} should be between "
                 f"{p.lower:g} and {p.upper:g}{unit}",
             )
+
+
+def _tissue_faults(
+    where: Location, path: str, effect: Effect, values: Mapping[str, float], scene: Scene
+) -> Iterator[tuple[Location, str]]:
+    """Whether this tissue can have the effect, where the values alone are well."""
+    # Effects on tissue know scenes, which are being checked here.
+    from defras_sim.effects.tissue_effect import TissueEffect
+
+    if isinstance(effect, TissueEffect):
+        try:
+            effect.scene(effect.complete(values), scene)
+        except ValueError as fault:
+            yield where, f"{path}: {fault}"
 
 
 def _hint(name: str, valid: list[str]) -> str:
