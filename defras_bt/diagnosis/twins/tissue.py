@@ -13,8 +13,10 @@ from defras_bt.diagnosis.recording import RecordedRun
 from defras_bt.diagnosis.recording_reader import UnusableRecording
 from defras_bt.diagnosis.twins.tissue_cells import AssignedCloud
 from defras_bt.diagnosis.twins.tissue_frames import TissueFrames, frames_of
+from defras_bt.diagnosis.twins.tissue_part import TissuePart
 from defras_bt.diagnosis.twins.tissue_phases import PHASES
 from defras_bt.diagnosis.twins.tissue_signals import Layout, noise_sd
+from defras_bt.diagnosis.twins.tissue_tangents import TissueTangents
 from defras_bt.diagnosis.twins.tissue_trajectory import MOST_FRAMES, Trajectory, trajectory
 from defras_sim.effects.effect import Extension
 from defras_sim.geometry import Floats
@@ -39,8 +41,9 @@ class TissueProblem:
         candidates: Sequence[Candidate],
         *,
         most_frames: int = MOST_FRAMES,
+        jobs: int = 1,
     ) -> None:
-        """``most_frames`` of a recording are compared.
+        """``most_frames`` of a recording are compared; ``jobs`` processes work side by side.
 
         Raises:
             UnusableRecording: the plain model cannot follow a recording at all.
@@ -56,6 +59,8 @@ class TissueProblem:
             _assigned(each, frames, scene, self.layout)
             for each, frames in zip(self.trajectories, plain, strict=True)
         )
+        self._jobs = jobs
+        self._tangents: tuple[str, TissueTangents] | None = None
         self._residuals: OrderedDict[str, Floats] = OrderedDict()
         self._remember_frames("[]", tuple(plain))
         self.samples = self._samples(plain)
@@ -75,8 +80,22 @@ class TissueProblem:
         return self._residuals[key]
 
     def tangents(self, model: Extension, candidate: Candidate) -> Sequence[Tangent]:
-        """How predictions change with ``candidate``; those of all are found at once."""
-        return ()
+        """How predictions change with ``candidate``; what those of all share is found once."""
+        key = _key(model)
+        if self._tangents is None or self._tangents[0] != key:
+            frames = self.frames(model)
+            if frames is None:
+                return ()
+            whole = {**self.scene.model.extension, **model}
+            parts = [
+                TissuePart(self.scene, whole, self.layout, each, assigned, its)
+                for each, assigned, its in zip(
+                    self.trajectories, self.assigned, frames, strict=True
+                )
+            ]
+            found = TissueTangents(self.scene, whole, parts, self.candidates, self._jobs)
+            self._tangents = (key, found)
+        return self._tangents[1].of(candidate)
 
     def frames(self, model: Extension) -> tuple[TissueFrames, ...] | None:
         """What ``model`` says of the frames of every trajectory; None where it cannot."""

@@ -50,6 +50,10 @@ class Layout:
         return len(self.grid) + 3 * len(self.with_force) + 3 * len(self.with_tip)
 
     @property
+    def first_tip_row(self) -> int:
+        return len(self.grid) + 3 * len(self.with_force)
+
+    @property
     def names(self) -> tuple[str, ...]:
         forces = [f"{arm} force {axis}" for arm in self.with_force for axis in _AXES]
         tips = [f"{arm} tip {axis}" for arm in self.with_tip for axis in _AXES]

@@ -1,0 +1,267 @@
+"""What every candidate would change in the recordings, near one model.
+
+Each layer of the twin has its own way. Effects of the camera move points, of the clock whole
+frames, both known at once for every frame. Effects of arm and grasp move the held patch, effects
+of the tissue its equilibrium: those are differentiated at a few keyframes and interpolated between
+them. What cannot be differentiated is led along once with the effect and once without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from defras_bt.diagnosis.problem import Candidate, Tangent
+from defras_bt.diagnosis.twins.tissue_part import ASIDE_M, KeyShapes, TissuePart, with_values
+from defras_bt.diagnosis.twins.tissue_pass import KeyShape, PassJob, run_pass
+from defras_sim.effects.effect import Effect, EffectParameter, Extension
+from defras_sim.effects.tissue_effect import TissueEffect
+from defras_sim.geometry import Floats
+from defras_sim.scene import Scene
+from defras_sim.tissue.model import NothingToGrasp
+
+_LATE_STEPS = (1.0, 3.0)
+"""Of a delay's step: late frames are not on a straight line for long."""
+_SLACK = {"joint_play": (1.0, 3.0)}
+"""Effects without a derivative at their null point, and of how many steps of theirs to try."""
+_ONSET = {"grasp_slip": "time_s", "attachment_tear": "time_s"}
+"""Effects that begin during the motion, and the parameter that says when."""
+_ONSETS = 7
+
+
+class TissueTangents:
+    """Tangents of all candidates at ``model``, the effects that the scene has included."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        model: Extension,
+        parts: Sequence[TissuePart],
+        candidates: Sequence[Candidate],
+        jobs: int,
+    ) -> None:
+        self._scene, self._model, self._parts = scene, model, tuple(parts)
+        self._effects = {c.effect.name: c.effect for c in candidates}
+        self._shapes: list[KeyShapes] = []
+        self._others: dict[str, list[Sequence[KeyShape | None]]] = {}
+        self._lead_along(candidates, jobs)
+
+    def of(self, candidate: Candidate) -> tuple[Tangent, ...]:
+        """All ways in which ``candidate`` could begin, or go on where the model has it."""
+        layer = candidate.effect.layer
+        if layer == "camera":
+            return (self._smooth(candidate, self._camera),)
+        if layer == "clock":
+            return tuple(self._late(candidate))
+        if layer in ("arm", "grasp"):
+            return tuple(self._carried(candidate))
+        return (*self._differentiated(candidate), *self._repeated(candidate))
+
+    def _camera(self, effect: str, values: Mapping[str, float]) -> Floats:
+        changed = with_values(self._model, effect, values)
+        return self._over_parts(lambda part, _: part.camera(changed))
+
+    def _carry(self, effect: str, values: Mapping[str, float]) -> Floats:
+        changed = with_values(self._model, effect, values)
+        return self._over_parts(lambda part, shapes: part.carried(changed, shapes))
+
+    def _smooth(
+        self, candidate: Candidate, change: Callable[[str, Mapping[str, float]], Floats]
+    ) -> Tangent:
+        """One column for each free parameter, a step of it away from where it stands."""
+        at = self._standing(candidate)
+        steps, columns = [], []
+        for p in candidate.free:
+            if not p.strength and not self._has(candidate):
+                continue
+            step = _inwards(p, at[p.name])
+            columns.append(change(candidate.effect.name, {**at, p.name: at[p.name] + step}))
+            steps.append({p.name: step})
+        return Tangent(at, tuple(steps), np.stack(columns, axis=1))
+
+    def _late(self, candidate: Candidate) -> Iterator[Tangent]:
+        at = self._standing(candidate)
+        effect = candidate.effect.name
+        for p in candidate.free:
+            for times in _LATE_STEPS:
+                step = times * _inwards(p, at[p.name])
+                column = self._over_parts(lambda part, _, late_s=step: part.late(late_s))
+                yield Tangent(at, ({p.name: step},), column[:, None])
+        if not candidate.free:
+            raise ValueError(f"{effect} has no free parameter")
+
+    def _carried(self, candidate: Candidate) -> Iterator[Tangent]:
+        name, at = candidate.effect.name, self._standing(candidate)
+        onset = _ONSET.get(name)
+        if self._has(candidate) or (onset is None and name not in _SLACK):
+            yield self._smooth(candidate, self._carry)
+            return
+        (p, *_) = [p for p in candidate.free if p.strength]
+        for start in self._onsets_s() if onset else (None,):
+            begun = at if onset is None or start is None else {**at, onset: start}
+            for times in _SLACK.get(name, (1.0,)):
+                step = times * p.step
+                column = self._carry(name, {**begun, p.name: begun[p.name] + step})
+                yield Tangent(begun, ({p.name: step},), column[:, None])
+
+    def _differentiated(self, candidate: Candidate) -> Iterator[Tangent]:
+        """One tangent for each place at which the effect could begin."""
+        effect = candidate.effect
+        standing = self._standing(candidate)
+        free = {p.name: p for p in candidate.free}
+        per_part = [
+            part.differentiated(shapes, effect.name)
+            for part, shapes in zip(self._parts, self._shapes, strict=True)
+        ]
+        everywhere: dict[tuple[tuple[str, float], ...], dict[str, None]] = {}
+        for found in per_part:
+            for _, parameter, where in found:
+                if parameter in free:
+                    everywhere.setdefault(where, {})[parameter] = None
+        for where, parameters in everywhere.items():
+            at = {**standing, **{n: v for n, v in where if n in free}}
+            blocks = {
+                parameter: self._joined(
+                    [found.get((effect.name, parameter, where)) for found in per_part]
+                )
+                for parameter in parameters
+            }
+            steps = tuple({name: _inwards(free[name], at[name])} for name in parameters)
+            columns = np.stack(
+                [blocks[name] * step[name] for name, step in zip(parameters, steps, strict=True)],
+                axis=1,
+            )
+            onset = _ONSET.get(effect.name)
+            if onset is None or self._has(candidate):
+                yield Tangent(at, steps, columns)
+                continue
+            for start in self._onsets_s():
+                begun = np.concatenate(
+                    [
+                        np.broadcast_to(part.trajectory.time_s >= start, part.shape).ravel()
+                        for part in self._parts
+                    ]
+                )
+                yield Tangent({**at, onset: start}, steps, columns * begun[:, None])
+
+    def _repeated(self, candidate: Candidate) -> Iterator[Tangent]:
+        others = self._others.get(candidate.key)
+        if others is None:
+            return
+        at = self._standing(candidate)
+        (p, *_) = [p for p in candidate.free if p.strength]
+        blocks = [
+            part.repeated(shapes.plain, other).ravel()
+            for part, shapes, other in zip(self._parts, self._shapes, others, strict=True)
+        ]
+        yield Tangent(at, ({p.name: _inwards(p, at[p.name])},), np.concatenate(blocks)[:, None])
+
+    def _lead_along(self, candidates: Sequence[Candidate], jobs: int) -> None:
+        """Run all passes that tangents need, side by side."""
+        tissue = tuple(n for n, e in self._effects.items() if isinstance(e, TissueEffect))
+        work: list[PassJob] = []
+        for part in self._parts:
+            plain = PassJob(
+                self._scene, self._model, part.trajectory, part.keyframes.chosen, tissue
+            )
+            bare = PassJob(
+                self._scene, self._model, part.trajectory, part.keyframes.chosen, derivatives=False
+            )
+            work += [plain, *(_aside(bare, way) for way in ((ASIDE_M, 0.0), (0.0, ASIDE_M)))]
+        found = _run(work, self._effects, jobs)
+        self._shapes = [KeyShapes(*found[3 * i : 3 * i + 3]) for i in range(len(self._parts))]
+        undifferentiated = [
+            c
+            for c in candidates
+            if c.effect.name in tissue
+            and not any(
+                p[0] == c.effect.name
+                for shapes in self._shapes
+                for shape in shapes.plain
+                if shape is not None
+                for p in shape.places
+            )
+        ]
+        work = []
+        for candidate in undifferentiated:
+            at = self._standing(candidate)
+            (p, *_) = [p for p in candidate.free if p.strength]
+            values = {**at, p.name: at[p.name] + _inwards(p, at[p.name])}
+            changed = with_values(self._model, candidate.effect.name, values)
+            work += [
+                PassJob(
+                    self._scene, changed, part.trajectory, part.keyframes.chosen, derivatives=False
+                )
+                for part in self._parts
+            ]
+        again = _run(work, self._effects, jobs)
+        count = len(self._parts)
+        for number, candidate in enumerate(undifferentiated):
+            self._others[candidate.key] = again[count * number : count * (number + 1)]
+
+    def _onsets_s(self) -> list[float]:
+        """Times spread over all in which tissue is held."""
+        held: list[Floats] = []
+        for part in self._parts:
+            motion = part.trajectory.motion
+            any_held = np.any([arm.grasped for arm in motion.arms.values()], axis=0)
+            held.append(motion.time_s[any_held])
+        times = np.sort(np.concatenate(held))
+        if len(times) == 0:
+            return []
+        at = np.linspace(0, len(times) - 1, _ONSETS + 2)[1:-1]
+        return [float(times[int(i)]) for i in at]
+
+    def _standing(self, candidate: Candidate) -> dict[str, float]:
+        """Where the candidate's free parameters stand in the model."""
+        values = self._model.get(candidate.effect.name, {})
+        return {p.name: float(values.get(p.name, p.null)) for p in candidate.free}
+
+    def _has(self, candidate: Candidate) -> bool:
+        """Whether the model has the candidate already."""
+        values = self._model.get(candidate.effect.name, {})
+        return any(values.get(p.name, p.null) != p.null for p in candidate.free if p.strength)
+
+    def _over_parts(self, change: Callable[..., Floats]) -> Floats:
+        blocks = [
+            change(part, shapes) for part, shapes in zip(self._parts, self._shapes, strict=True)
+        ]
+        return np.concatenate([block.ravel() for block in blocks])
+
+    def _joined(self, blocks: Sequence[Floats | None]) -> Floats:
+        return np.concatenate(
+            [
+                np.zeros(int(np.prod(part.shape))) if block is None else block.ravel()
+                for part, block in zip(self._parts, blocks, strict=True)
+            ]
+        )
+
+
+def _inwards(p: EffectParameter, value: float) -> float:
+    """The parameter's step, turned round where it would leave the bounds."""
+    return p.step if value + p.step <= p.upper else -p.step
+
+
+def _aside(job: PassJob, way_m: tuple[float, float]) -> PassJob:
+    return PassJob(
+        job.scene, job.model, job.trajectory, job.chosen, aside_m=way_m, derivatives=False
+    )
+
+
+def _run(
+    work: Sequence[PassJob], effects: Mapping[str, Effect], jobs: int
+) -> list[Sequence[KeyShape | None]]:
+    if jobs == 1 or len(work) <= 1:
+        return [_led(job, effects) for job in work]
+    led = Parallel(n_jobs=jobs, inner_max_num_threads=1)(delayed(_led)(j, effects) for j in work)
+    return list(led)
+
+
+def _led(job: PassJob, effects: Mapping[str, Effect]) -> Sequence[KeyShape | None]:
+    """A pass; where the model cannot take the tissue at all, it is unknown everywhere."""
+    try:
+        return run_pass(job, effects)
+    except (NothingToGrasp, ValueError):
+        return [None] * len(job.chosen)
