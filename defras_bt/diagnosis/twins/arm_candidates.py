@@ -21,9 +21,8 @@ _WIDTHS = np.geomspace(0.01, 0.6, 14)
 """Of play that is looked for, as shares of the range of the joint: each 1.4 times the last."""
 
 _LAGS_S = np.geomspace(0.01, 0.32, 11)
-"""That are looked for, each 1.4 times the last. Between rows set-points are taken as straight: so
-late by half a row is late by what that row brings, and no derivative at zero tells what 50 ms do.
-"""
+"""That are looked for, each 1.4 times the last: what a lag of several rows does is not what the
+derivative at zero says."""
 
 _ARM: tuple[JointName, ...] = tuple(q for q in JOINTS if q not in WRIST)
 

@@ -7,12 +7,14 @@ import numpy as np
 from defras_sim.effects.arm_joints import JOINTS
 from defras_sim.effects.effect import ArmEffect, EffectParameter, Values
 from defras_sim.geometry import Floats
+from defras_sim.tissue.matrices import jit
 
 
 class ServoLag(ArmEffect):
-    """True joints are those commanded some time ago, linear between commands.
+    """A position loop: the joint's speed is what it is away from its command, by the lag.
 
-    Behind a position loop a joint that moves steadily is late by one time, whatever its speed.
+    A joint that moves steadily is late by that time, whatever its speed. On measured motions this
+    describes a servo better than a pure delay, which hands on the command's own trembling.
     """
 
     name = "servo_lag"
@@ -21,13 +23,16 @@ class ServoLag(ArmEffect):
     parameters = tuple(
         EffectParameter(
             f"{q}_s", "s", null=0.0, lower=0.0, upper=0.5, step=0.01,
-            meaning=f"time by which {q} is late",
+            meaning=f"time by which {q} is late in a steady motion",
         )
         for q in JOINTS
     )  # fmt: skip
     falsified_by = "The error of the joint is there at rest too, or does not grow with its speed."
     excited_by = "Moving the joint to and fro at different speeds."
-    source = "Lag of setpoint_js to measured_js of a dVRK arm; arXiv 2406.07375 has such motions."
+    source = (
+        "Velocity error of a proportional position loop; B. Siciliano et al., Robotics (2009), "
+        "section 8.3. Motions of a dVRK arm: arXiv 2406.07375."
+    )
     place = 0
     encoders_see = True
 
@@ -35,11 +40,26 @@ class ServoLag(ArmEffect):
         own = self.complete(values)
         late = joints.astype(float)
         for column, parameter in enumerate(self.parameters):
-            lag_s = own[parameter.name]
-            if lag_s > 0:
-                # Before its first command a joint stood where that command finds it.
-                late[:, column] = np.interp(time_s - lag_s, time_s, joints[:, column])
+            if own[parameter.name] > 0:
+                command = np.ascontiguousarray(joints[:, column], float)
+                late[:, column] = lagging(time_s, command, own[parameter.name])
         return late
+
+
+@jit
+def lagging(time_s: Floats, command: Floats, lag_s: float) -> Floats:
+    """Where a joint is (n,) that follows ``command`` (n,), at rest before: exact where commands go
+    straight from row to row."""
+    joint = np.empty_like(command)
+    joint[0] = command[0]
+    for row in range(1, len(command)):
+        passed = (time_s[row] - time_s[row - 1]) / lag_s
+        left = np.exp(-passed)
+        behind = -np.expm1(-passed) / passed if passed > 0 else 1.0
+        joint[row] = (
+            left * joint[row - 1] + (1 - behind) * command[row] + (behind - left) * command[row - 1]
+        )
+    return joint
 
 
 EFFECT = ServoLag()
