@@ -74,5 +74,5 @@ def _draw(
 def _colour(noise: ChannelNoise, size: int) -> Floats:
     """Frequency response (size // 2 + 1,) from independent innovations to this noise."""
     frequency = np.exp(-2j * np.pi * np.arange(size // 2 + 1) / size)
-    past = sum((a * frequency ** (k + 1) for k, a in enumerate(noise.ar)), np.zeros(1))
+    past = sum((a * frequency ** (k + 1) for k, a in enumerate(noise.ar)), np.zeros(len(frequency)))
     return np.asarray(noise.innovation_sd / (1.0 - past))
