@@ -6,12 +6,14 @@ from collections import OrderedDict
 from collections.abc import Sequence
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from defras_bt.diagnosis.problem import Candidate, Integers, Samples, Tangent
 from defras_bt.diagnosis.quality import DataQuality
 from defras_bt.diagnosis.recording import RecordedRun
 from defras_bt.diagnosis.recording_reader import UnusableRecording
 from defras_bt.diagnosis.twins.tissue_cells import AssignedCloud
+from defras_bt.diagnosis.twins.tissue_correction import MeshCorrection, finer
 from defras_bt.diagnosis.twins.tissue_frames import TissueFrames, frames_of
 from defras_bt.diagnosis.twins.tissue_part import TissuePart
 from defras_bt.diagnosis.twins.tissue_phases import PHASES
@@ -54,12 +56,12 @@ class TissueProblem:
         self.trajectories = tuple(trajectory(run, scene, most_frames) for run in runs)
         self.layout = Layout.of(scene, self.trajectories)
         self._frames: OrderedDict[str, tuple[TissueFrames, ...]] = OrderedDict()
-        plain = [self._followed(each) for each in self.trajectories]
+        self._jobs = jobs
+        plain, self._corrections = self._followed()
         self.assigned = tuple(
             _assigned(each, frames, scene, self.layout)
             for each, frames in zip(self.trajectories, plain, strict=True)
         )
-        self._jobs = jobs
         self._tangents: tuple[str, TissueTangents] | None = None
         self._residuals: OrderedDict[str, Floats] = OrderedDict()
         self._remember_frames("[]", tuple(plain))
@@ -102,7 +104,10 @@ class TissueProblem:
         key = _key(model)
         if key not in self._frames:
             try:
-                found = tuple(frames_of(self.scene, model, each) for each in self.trajectories)
+                found = tuple(
+                    correction.applied(frames_of(self.scene, model, each))
+                    for each, correction in zip(self.trajectories, self._corrections, strict=True)
+                )
             except (NothingToGrasp, ValueError):  # no such tissue, or none where the jaw closes
                 return None
             self._remember_frames(key, found)
@@ -120,18 +125,32 @@ class TissueProblem:
         while len(self._frames) > 3:
             self._frames.popitem(last=False)
 
-    def _followed(self, each: Trajectory) -> TissueFrames:
-        """The frames of a trajectory as the plain model has them."""
+    def _followed(self) -> tuple[list[TissueFrames], tuple[MeshCorrection, ...]]:
+        """The frames of every trajectory as the plain model has them, its mesh's error put right.
+
+        Raises:
+            UnusableRecording: the model cannot follow a trajectory at all.
+        """
+        fine = finer(self.scene)
+        work = [(self.scene, each) for each in self.trajectories]
+        work += [] if fine is None else [(fine, each) for each in self.trajectories]
         try:
-            frames = frames_of(self.scene, {}, each)
+            found = Parallel(n_jobs=self._jobs, inner_max_num_threads=1)(
+                delayed(frames_of)(scene, {}, each) for scene, each in work
+            )
         except NothingToGrasp as miss:
             raise UnusableRecording(
-                f"{each.name}: the model cannot repeat a grasp of the recording: {miss}. Is the "
-                "scene that of this recording, and are its frames right?"
+                f"the model cannot repeat a grasp that was recorded: {miss}. Is the scene that of "
+                "this recording, and are its frames right?"
             ) from miss
-        if all(surface is None for surface in frames.surfaces):
-            raise UnusableRecording(f"{each.name}: the model finds no equilibrium in any frame")
-        return frames
+        plain = found[: len(self.trajectories)]
+        for each, frames in zip(self.trajectories, plain, strict=True):
+            if all(surface is None for surface in frames.surfaces):
+                raise UnusableRecording(f"{each.name}: the model finds no equilibrium in any frame")
+        others = found[len(plain) :] or plain
+        corrections = tuple(map(MeshCorrection.between, plain, others))
+        corrected = [c.applied(f) for c, f in zip(corrections, plain, strict=True)]
+        return corrected, corrections
 
     def _samples(self, plain: Sequence[TissueFrames]) -> Samples:
         blocks = self._blocks(plain)
