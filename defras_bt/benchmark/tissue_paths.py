@@ -97,9 +97,9 @@ def summary(results: Sequence[PathResult]) -> PathsSummary:
     )
 
 
-def rows(results: Sequence[PathResult]) -> list[dict[str, object]]:
-    """One row a path, for the tables of :func:`defras_bt.benchmark.files.write_benchmark`."""
-    return [asdict(result) for result in results]
+def failures(results: Sequence[PathResult]) -> list[dict[str, object]]:
+    """One row for each path with steps that did not converge, or worse."""
+    return [asdict(r) for r in results if r.stale or r.untrue or r.error is not None]
 
 
 def run_path(

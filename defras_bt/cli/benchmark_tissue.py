@@ -49,7 +49,7 @@ def tissue(
             f"this benchmark compares with felupe, and {error.name} is not installed; "
             "install the extra: pip install 'defras[bench]'"
         ) from error
-    from defras_bt.benchmark.tissue_paths import PathResult, run_paths, summary
+    from defras_bt.benchmark.tissue_paths import PathResult, failures, run_paths, summary
     from defras_bt.benchmark.tissue_plot import tissue_figure
 
     cases: list[Case] = []
@@ -62,6 +62,7 @@ def tissue(
         tables = {
             "Targets": targets(cases, ends),
             "Random paths": [asdict(summary(ends))],
+            "Random paths that failed somewhere": failures(ends),
             "Growth with the mesh": [size.row() for size in sizes],
             "Every model and motion": [case.row() for case in cases],
         }

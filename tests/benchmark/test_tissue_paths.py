@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 
 from defras_bt.benchmark import tissue_paths
@@ -5,6 +7,7 @@ from defras_bt.benchmark.tissue_paths import (
     MATERIALS,
     STEP_M,
     PathResult,
+    failures,
     random_scene,
     run_path,
     run_paths,
@@ -76,3 +79,10 @@ def test_what_is_raised_is_told(monkeypatch):
     monkeypatch.setattr(TissueModel, "solve", broken)
     result = run_path(0, 0, (3, 3, 1), 4)
     assert result == PathResult(**{**result.__dict__, "error": "ValueError: nothing goes"})
+
+
+def test_only_paths_that_failed_somewhere_are_listed() -> None:
+    good = run_path(0, 0, (4, 4, 1), 2)
+    stale = replace(good, path=7, stale=1)
+    broken = replace(good, path=8, error="ValueError: x")
+    assert [row["path"] for row in failures([good, stale, broken])] == [7, 8]
