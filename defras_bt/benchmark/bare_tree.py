@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import py_trees
+from py_trees import composites, decorators
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
@@ -25,7 +26,7 @@ class BareTree:
 
     def __init__(self, tree_file: Path, records: Sequence[TickRecord]) -> None:
         self._records: Iterator[TickRecord] = iter(records)
-        root = _build(read_tree(tree_file).root)
+        root = bare(read_tree(tree_file).root, lambda spec: _Leaf(spec.name))
         self._bt = py_trees.trees.BehaviourTree(root)
         slots = [(node, path) for node, path in walk(root) if isinstance(node, PlanSlot)]
         self._slot: PlanSlot | None = slots[0][0] if slots else None
@@ -70,8 +71,21 @@ class _Leaf(Behaviour):
         return self.says
 
 
-def _build(spec: NodeSpec) -> Behaviour:
+def bare(spec: NodeSpec, leaf: Callable[[NodeSpec], Behaviour]) -> Behaviour:
+    """The tree of ``spec`` from py_trees' own inner nodes; ``leaf`` makes the leaves.
+
+    A plan slot, which py_trees does not know, stays what it is.
+    """
     if spec.node_class is not None:
-        return _Leaf(spec.name)
-    children = [_build(child) for child in spec.children]
+        return leaf(spec)
+    children = [bare(child, leaf) for child in spec.children]
+    match spec.kind:
+        case "reactive" | "sequence":
+            return composites.Sequence(spec.name, spec.kind == "sequence", children)
+        case "reactive_selector" | "selector":
+            return composites.Selector(spec.name, spec.kind == "selector", children)
+        case "invert":
+            return decorators.Inverter(spec.name, children[0])
+        case "ignore_failure":
+            return decorators.FailureIsSuccess(spec.name, children[0])
     return KINDS[spec.kind].build(spec.name, spec.options, children)

@@ -6,8 +6,6 @@ import py_trees
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from defras_bt.executive.node import Node
-
 
 class ActionVisitor(py_trees.visitors.VisitorBase):
     """Notes the leaves of role "motion" that were ticked.
@@ -18,13 +16,14 @@ class ActionVisitor(py_trees.visitors.VisitorBase):
 
     def __init__(self) -> None:
         super().__init__(full=False)
-        self._ticked: list[Node] = []
+        self._ticked: list[Behaviour] = []
 
     def initialise(self) -> None:
         self._ticked = []
 
     def run(self, behaviour: Behaviour) -> None:
-        if isinstance(behaviour, Node) and behaviour.role == "motion":
+        # Only leaves have a role. Asking for their class is slow.
+        if getattr(behaviour, "role", None) == "motion":
             self._ticked.append(behaviour)
 
     @property

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import py_trees
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from defras_bt.executive import quiet
 from defras_bt.executive.reasons import Code
 
 
-class PlanSlot(py_trees.composites.Sequence):
+class PlanSlot(quiet.Sequence):
     """The place in a tree where the actions of a plan are carried out, in order and once.
 
     An empty py_trees sequence succeeds, and a pre-empted or finished one starts again at its first

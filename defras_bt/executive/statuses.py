@@ -13,7 +13,6 @@ from py_trees.common import Status
 from defras_bt.executive.blackboard import Blackboard
 from defras_bt.executive.composites import PlanSlot
 from defras_bt.executive.loader import LoadedTree, walk
-from defras_bt.executive.node import Node
 from defras_bt.executive.reasons import Code
 from defras_bt.recording.record import Cause
 
@@ -142,8 +141,8 @@ class TickedVisitor(py_trees.visitors.VisitorBase):
         if decider is not None:
             heard = self._now[decider]
             return _Word(status, heard.code, heard.message, decider, heard.leaf)
-        # Only leaves and the plan slot have words of their own.
-        code = behaviour.code if isinstance(behaviour, Node | PlanSlot) else ""
+        # Only leaves and the plan slot have words of their own. Asking for their class is slow.
+        code = getattr(behaviour, "code", "")
         return _Word(status, code, behaviour.feedback_message, None, behaviour)
 
     def _cause(self, word: _Word | None) -> Cause | None:
@@ -155,14 +154,14 @@ class TickedVisitor(py_trees.visitors.VisitorBase):
 def deciding_child(parent: Behaviour, heard: Mapping[Behaviour, _Word]) -> Behaviour | None:
     """The child that made ``parent``'s status what it is; None if none was ticked.
 
-    Of a decorator it is what it decorates. Otherwise it is the last ticked child with the parent's
-    status: the one that stopped a sequence or was chosen by a selector. Where all children of a
-    selector failed, one that was not even tried decides nothing. Call it as soon as ``parent`` was
-    ticked; ``heard`` has what was ticked in this tick.
+    Where one child was ticked, as under a decorator, it is that one. Otherwise it is the last one
+    with the parent's status: the one that stopped a sequence or was chosen by a selector. Where all
+    children of a selector failed, one that was not even tried decides nothing. Call it as soon as
+    ``parent`` was ticked; ``heard`` has what was ticked in this tick.
     """
     ticked = [child for child in parent.children if child in heard]
-    if not ticked or isinstance(parent, py_trees.decorators.Decorator):
-        return ticked[-1] if ticked else None
+    if len(ticked) < 2:
+        return ticked[0] if ticked else None
     same = [child for child in ticked if heard[child].status == parent.status]
     tried = [child for child in same if heard[child].code != Code.WOULD_NOT_HELP]
     candidates = tried or same or ticked

@@ -15,6 +15,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import OneShotPolicy, Status
 from pydantic import Field
 
+from defras_bt.executive import quiet
 from defras_bt.executive.node import NodeParameters, NoParameters
 from defras_bt.executive.time_out import TimeOut
 
@@ -92,13 +93,13 @@ _SAME = {S: S, F: F, R: R}
 _KINDS = (
     _plain(
         "invert",
-        decorators.Inverter,
+        quiet.Inverter,
         "Fails when its child succeeds and succeeds when it fails.",
         {S: F, F: S, R: R},
     ),
     _plain(
         "ignore_failure",
-        decorators.FailureIsSuccess,
+        quiet.FailureIsSuccess,
         "Succeeds also when its child fails.",
         {S: S, F: S, R: R},
     ),

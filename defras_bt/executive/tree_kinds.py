@@ -18,6 +18,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import ParallelPolicy
 from pydantic import Field
 
+from defras_bt.executive import quiet
 from defras_bt.executive.composites import PlanSlot
 from defras_bt.executive.node import NodeParameters, NoParameters
 from defras_bt.executive.registry import did_you_mean
@@ -96,26 +97,26 @@ _KINDS = (
         "children",
         "Every tick, ticks its children in order from the first until one does not succeed; that "
         "one pre-empts those after it. The place for guards: they come before what they guard.",
-        lambda name, _, children: composites.Sequence(name, memory=False, children=children),
+        lambda name, _, children: quiet.Sequence(name, memory=False, children=children),
     ),
     Kind(
         "sequence",
         "children",
         "Carries out its children one after the other; a finished child is not looked at again.",
-        lambda name, _, children: composites.Sequence(name, memory=True, children=children),
+        lambda name, _, children: quiet.Sequence(name, memory=True, children=children),
     ),
     Kind(
         "reactive_selector",
         "children",
         "Every tick, tries its children in order from the first until one does not fail; that one "
         "pre-empts those after it.",
-        lambda name, _, children: composites.Selector(name, memory=False, children=children),
+        lambda name, _, children: quiet.Selector(name, memory=False, children=children),
     ),
     Kind(
         "selector",
         "children",
         "Tries its children in order until one succeeds; a running child is kept until it ends.",
-        lambda name, _, children: composites.Selector(name, memory=True, children=children),
+        lambda name, _, children: quiet.Selector(name, memory=True, children=children),
     ),
     Kind(
         "parallel",

@@ -6,6 +6,7 @@ the x-z plane divides the two arms' sides. In simulation it is also the world fr
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
 
@@ -124,7 +125,7 @@ class Scene(Part):
     @property
     def attached(self) -> NDArray[np.bool_]:
         """Which holes hold (n,), in the order of :attr:`holes_xy_m`."""
-        return np.array([mark == "#" for row in reversed(self.attachments.map) for mark in row])
+        return _marked(self.attachments.map).copy()
 
     @property
     def hold_n_per_m(self) -> float:
@@ -232,6 +233,12 @@ class Scene(Part):
             for name, values in extension.items()
         )
         return self.model_copy(update={"model": ModelExtension(effects=adopted)})
+
+
+@lru_cache(maxsize=64)
+def _marked(rows: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Which marks of a map, from the last row to the first, say that something holds."""
+    return np.array([mark == "#" for row in reversed(rows) for mark in row])
 
 
 def _spread(index: int, count: int, half_m: float) -> float:
