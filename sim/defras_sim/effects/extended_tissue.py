@@ -15,8 +15,9 @@ from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import Scene
 from defras_sim.tissue.holes import TERM_NAME as ATTACHMENTS
 from defras_sim.tissue.model import TissueModel, TissueSnapshot
+from defras_sim.tissue.parameters import TermParameter
 from defras_sim.tissue.state import TissueState
-from defras_sim.tissue.terms import Term
+from defras_sim.tissue.terms import OnBed, Term
 from defras_sim.tissue.travel import Tips
 
 # What tears loads its neighbours, which may then tear. A chain as long as this runs away.
@@ -60,6 +61,8 @@ class ExtendedTissue:
         self._believed_n_per_m = self.model.hole_stiffness_n_per_m
         self._plain = {name: t for name, t in self.model.terms.items() if name != ATTACHMENTS}
         self._placed: Mapping[str, Term] = self._plain
+        self._on_bed: dict[str, tuple[Term, float, Term]] = {}
+        """By name: a term, by how much it was raised, and what that gave."""
         self._evolutions: dict[str, Evolution] = {
             effect.name: effect.begin(values, self.model) for effect, values in effects
         }
@@ -107,6 +110,8 @@ class ExtendedTissue:
         terms: Mapping[str, Term] = self._plain
         for each in self._evolutions.values():
             terms = each.terms(terms)
+        height_m = sum(each.lift_m() for each in self._evolutions.values())
+        terms = {name: self._raised(term, height_m) for name, term in terms.items()}
         for name in self._placed.keys() - terms.keys():
             self.model.remove_term(name)
         for name, term in terms.items():
@@ -116,7 +121,17 @@ class ExtendedTissue:
         held = self._held_n_per_m(self._believed_n_per_m)
         if not np.array_equal(held, self.model.hole_stiffness_n_per_m):
             self.model.set_hole_stiffness(held)
-        self.model.lift_attachments(sum(each.lift_m() for each in self._evolutions.values()))
+        self.model.lift_attachments(height_m)
+
+    def _raised(self, term: Term, height_m: float) -> Term:
+        """``term`` on a bed so much higher; the same object as long as nothing changes."""
+        if not isinstance(term, OnBed):
+            return term
+        known = self._on_bed.get(term.name)
+        if known is None or known[0] is not term or known[1] != height_m:
+            raised = term.raised(height_m) if height_m != 0.0 else term
+            known = self._on_bed[term.name] = term, height_m, raised
+        return known[2]
 
     def _held_n_per_m(self, stiffness_n_per_m: Floats) -> Floats:
         for each in self._evolutions.values():
@@ -124,8 +139,21 @@ class ExtendedTissue:
         return stiffness_n_per_m
 
     def directions(self, effect: str) -> tuple[Direction, ...]:
-        """Derivatives by the parameters of ``effect``, which must be one of the extension."""
-        return self._evolutions[effect].directions()
+        """Derivatives by the parameters of ``effect``, which must be one of the extension.
+
+        None that another effect hides: within a softened material, its parts have none. What the
+        tissue has been through is taken as it was.
+        """
+        terms = self.model.terms
+        return tuple(
+            direction
+            for direction in self._evolutions[effect].directions()
+            if all(
+                p.term in terms and p.parameter in terms[p.term].parameters
+                for p in direction.by
+                if isinstance(p, TermParameter)
+            )
+        )
 
     def grasp(self, arm: str, tissue_from_tip: Pose) -> None:
         """See :meth:`TissueModel.grasp`."""

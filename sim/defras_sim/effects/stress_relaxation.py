@@ -2,17 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from defras_sim.effects.coupon_effect import CouponEffect, Pull
-from defras_sim.effects.effect import Effect, EffectParameter, Values
+from defras_sim.effects.effect import EffectParameter, Values
+from defras_sim.effects.tissue_effect import (
+    Direction,
+    Evolution,
+    Terms,
+    TissueEffect,
+    material_parts,
+)
 from defras_sim.geometry import Floats
+from defras_sim.tissue.fading import Fading, Step
 from defras_sim.tissue.matrices import jit
+from defras_sim.tissue.model import TissueModel
+from defras_sim.tissue.parameters import TermParameter
+from defras_sim.tissue.prestress import second_piola_pa
+from defras_sim.tissue.softened import Part, density_and_stress
+from defras_sim.tissue.state import TissueState
+
+# Where nothing fades yet, fading is looked for with these times beside the one given.
+TIMES_S = (0.5, 2.0, 8.0)
+# Of the stiffness: while a hold changes stresses by less (rms), a solve is not worth it.
+NOTICED = 1e-4
 
 
-class StressRelaxation(Effect, CouponEffect):
+class StressRelaxation(TissueEffect, CouponEffect):
     """Quasi-linear viscoelasticity: of each elastic stress, ``fraction`` fades within ``time_s``.
 
     sigma(t) = integral of G(t - s) d sigma_elastic(s), G(t) = 1 - f (1 - exp(-t / tau)). The
@@ -20,7 +38,7 @@ class StressRelaxation(Effect, CouponEffect):
     """
 
     name = "stress_relaxation"
-    layer = "tissue"
+    rank = 3
     twins = ("tissue", "coupon")
     sentence = "Stress fades while the tissue is held."
     parameters = (
@@ -49,6 +67,94 @@ class StressRelaxation(Effect, CouponEffect):
         fading = fading_memory(pull.time_s, pull.stress_pa, at["time_s"])
         fraction = at["fraction"]
         return replace(pull, stress_pa=(1 - fraction) * pull.stress_pa + fraction * fading)
+
+    def begin(self, values: Values, model: TissueModel) -> Evolution:
+        return _Fades(values["fraction"], values["time_s"], model)
+
+
+@dataclass(frozen=True)
+class _Past:
+    """The last solve: its time, the elastic stress (elements, points, 3, 3) and, for each time
+    constant, the fading one."""
+
+    time_s: float
+    stress_pa: Floats
+    fading_pa: tuple[Floats, ...]
+
+
+class _Fades(Evolution):
+    """Before its first solve the tissue has lain for ever: of the stress that its weight makes,
+    nothing is left to fade."""
+
+    memory: _Past | None = None
+
+    def __init__(self, fraction: float, tau_s: float, model: TissueModel) -> None:
+        self._fraction = fraction
+        self._noticed_pa = NOTICED * model.scene.tissue.young_modulus_pa
+        others = () if fraction > 0 else tuple(t for t in TIMES_S if t != tau_s)
+        self._taus_s = (tau_s, *others)
+        self._elastic: tuple[Part, ...] = ()
+        self._steps = tuple(Step(0.0) for _ in self._taus_s)
+
+    def before(self, time_s: float) -> bool:
+        past = self.memory
+        if past is None:
+            return False
+        if time_s < past.time_s:
+            raise ValueError(
+                f"world time went back from {past.time_s:g} s to {time_s:g} s; what fades cannot"
+            )
+        self._steps = tuple(Step((time_s - past.time_s) / tau) for tau in self._taus_s)
+        faded = self._fraction * (1 - self._steps[0].left)
+        rms_pa = np.sqrt(np.mean(past.fading_pa[0] ** 2))
+        return bool(faded * rms_pa > self._noticed_pa)
+
+    def terms(self, terms: Terms) -> Terms:
+        elastic = material_parts(terms)
+        self._elastic = elastic
+        ahead = self._ahead()
+        term = Fading.of(elastic[0].points, elastic, self._fraction, ahead)
+        if self._fraction == 0.0:
+            return {**terms, term.name: term}
+        factor = 1 - self._fraction * (1 - ahead[0][1])
+        scaled = {part.name: part.scaled(factor) for part in elastic}
+        return {**terms, **scaled, term.name: term}
+
+    def after(self, time_s: float, state: TissueState) -> bool:
+        past = self.memory
+        F = self._elastic[0].points.deformation(state.nodes_m)
+        stress = second_piola_pa(F, density_and_stress(self._elastic, F)[1])
+        if past is None:
+            fading = tuple(np.zeros_like(stress) for _ in self._taus_s)
+        else:
+            change = stress - past.stress_pa
+            fading = tuple(
+                step.memory(before, change)
+                for step, before in zip(self._steps, past.fading_pa, strict=True)
+            )
+        self.memory = _Past(time_s, stress, fading)
+        return False
+
+    def directions(self) -> tuple[Direction, ...]:
+        return tuple(
+            Direction(
+                "fraction",
+                {"time_s": tau},
+                {TermParameter("stress_relaxation", f"fraction_{number}"): 1.0},
+            )
+            for number, tau in enumerate(self._taus_s)
+        )
+
+    def _ahead(self) -> list[tuple[Floats, float]]:
+        """For each time constant: e H_before - g S_before, and g (see the module on fading)."""
+        past = self.memory
+        if past is None:
+            nothing = np.zeros((*self._elastic[0].points.volumes_m3.shape, 3, 3))
+            return [(nothing, 0.0) for _ in self._taus_s]
+        return [
+            (step.left * fading - step.arriving * past.stress_pa, step.arriving)
+            for step, fading in zip(self._steps, past.fading_pa, strict=True)
+        ]
 
 
 @jit

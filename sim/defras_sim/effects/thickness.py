@@ -2,24 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from defras_sim.effects.effect import EffectParameter, Values
-from defras_sim.effects.tissue_effect import Direction, Evolution, Steady, TissueEffect
-from defras_sim.scene import Scene
+from defras_sim.effects.tissue_effect import (
+    Direction,
+    Evolution,
+    Terms,
+    TissueEffect,
+    base_material,
+)
+from defras_sim.scene import Tissue
+from defras_sim.tissue.loads import DeadLoad
 from defras_sim.tissue.model import TissueModel
-from defras_sim.tissue.parameters import AttachmentHeight, Parameter, TermParameter
+from defras_sim.tissue.parameters import (
+    GRAVITY_M_S2,
+    AttachmentHeight,
+    Parameter,
+    TermParameter,
+)
+from defras_sim.tissue.terms import Term
 
 SCALE = "scale"
 
 
 class Thickness(TissueEffect):
-    """The slab is ``scale`` times as thick; its upper face stays, bed and holes are where its lower
-    face then is."""
+    """The tissue is ``scale`` times as thick: its upper face, which is seen, stays; bed and holes
+    are so much lower.
+
+    The dents of holes and jaws stay as they are: their depth goes with the power -0.3 of the
+    thickness only.
+    """
 
     name = "thickness"
     sentence = "The tissue is thicker or thinner than its model."
     parameters = (
         EffectParameter(
-            SCALE, "1", null=1.0, lower=0.2, upper=5.0, step=0.1,
+            SCALE, "1", null=1.0, lower=0.3, upper=3.0, step=0.1,
             meaning="true thickness by the modelled one",
         ),
     )  # fmt: skip
@@ -27,29 +46,48 @@ class Thickness(TissueEffect):
     excited_by = "A fold beside a stretch: one grows with the cube of thickness, one with itself."
     source = "S. Timoshenko, S. Woinowsky-Krieger, Theory of Plates and Shells, 2nd ed., ch. 2."
 
-    def scene(self, values: Values, scene: Scene) -> Scene:
-        scale = values[SCALE]
-        if scale == 1.0:
-            return scene
-        if scene.tissue.anatomy is not None:
-            raise ValueError(
-                "thickness: an anatomy is as thick as its scan says; only slabs can be rescaled"
-            )
-        thicker = {"thickness_m": scale * scene.tissue.thickness_m}
-        return scene.model_copy(update={"tissue": scene.tissue.model_copy(update=thicker)})
-
     def begin(self, values: Values, model: TissueModel) -> Evolution:
-        tissue = model.scene.tissue
-        if tissue.anatomy is not None or tissue.gravity_m_s2 != 0.0:
-            return Evolution()
-        scale = values[SCALE]
+        return _Thicker(values[SCALE], model.scene.tissue)
+
+
+class _Thicker(Evolution):
+    def __init__(self, scale: float, tissue: Tissue) -> None:
+        self._scale, self._modelled_m = scale, tissue.thickness_m
+        self._weight_m_s2 = tissue.gravity_m_s2
+        self._made_of: Term | None = None
+        self._thicker: Terms = {}
+        self._has_bed = False
+
+    def terms(self, terms: Terms) -> Terms:
+        self._has_bed = "bed" in terms
+        if self._scale == 1.0:
+            return terms
+        if self._made_of is not terms["material"]:
+            self._made_of, self._thicker = terms["material"], self._thickened(terms)
+        return {**terms, **self._thicker}
+
+    def lift_m(self) -> float:
+        return (1 - self._scale) * self._modelled_m
+
+    def directions(self) -> tuple[Direction, ...]:
         by: dict[Parameter, float] = {
-            TermParameter("material", "thickness_scale"): 1 / scale,
-            AttachmentHeight(): -tissue.thickness_m / scale,
+            TermParameter("material", "thickness_scale"): 1 / self._scale,
+            AttachmentHeight(): -self._modelled_m,
         }
-        if tissue.bed:
-            by[TermParameter("bed", "height_m")] = -tissue.thickness_m / scale
-        return Steady((Direction(SCALE, {}, by),))
+        if self._has_bed:
+            by[TermParameter("bed", "height_m")] = -self._modelled_m
+        if self._weight_m_s2:
+            by[GRAVITY_M_S2] = self._weight_m_s2 / self._scale
+        return (Direction(SCALE, {}, by),)
+
+    def _thickened(self, terms: Terms) -> Terms:
+        body = base_material(terms)
+        thicker: Terms = {body.name: body.with_points(body.points.thickened(self._scale))}
+        gravity = terms.get("gravity")
+        if isinstance(gravity, DeadLoad):
+            weight = replace(gravity, forces_n=self._scale * gravity.forces_n)
+            return {**thicker, "gravity": weight}
+        return thicker
 
 
 EFFECT = Thickness()

@@ -15,8 +15,10 @@ from defras_sim.effects.effect import Effect, Layer, TwinName, Values
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 from defras_sim.tissue.assembly import ElasticBody
+from defras_sim.tissue.material_points import MaterialTerm
 from defras_sim.tissue.model import TissueModel
 from defras_sim.tissue.parameters import Parameter
+from defras_sim.tissue.softened import Part
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.terms import Term
 
@@ -69,7 +71,7 @@ class Evolution:
         return stiffness_n_per_m
 
     def lift_m(self) -> float:
-        """How much higher than modelled what the attachments are attached to is by now."""
+        """How much higher than modelled the bed and what holds the tissue to it are by now."""
         return 0.0
 
     def after(self, time_s: float, state: TissueState) -> bool:
@@ -99,6 +101,11 @@ def base_material(terms: Terms) -> ElasticBody:
             "body should have a lower rank than those that wrap it"
         )
     return body
+
+
+def material_parts(terms: Terms) -> tuple[Part, ...]:
+    """The material and what was put beside it."""
+    return tuple(t for t in terms.values() if isinstance(t, ElasticBody | MaterialTerm))
 
 
 class TissueEffect(Effect):

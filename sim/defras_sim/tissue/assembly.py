@@ -34,6 +34,7 @@ class ElasticBody:
     """
 
     name = "material"
+    is_nothing = False
 
     def __init__(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,6 +47,10 @@ class Bed:
     @property
     def parameters(self) -> tuple[str, ...]:
         return ("height_m",)
+
+    def raised(self, height_m: float) -> Bed:
+        """The same bed, ``height_m`` higher."""
+        return replace(self, height_m=self.height_m + height_m)
 
     def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
         """Energy [J] and its gradient (nodes, 3) [N]; zero above the bed."""

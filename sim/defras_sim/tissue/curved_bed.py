@@ -6,7 +6,7 @@ before anything is moved. So the bed follows the lower face at rest, as the orga
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -70,6 +70,10 @@ class CurvedBed:
     @property
     def parameters(self) -> tuple[str, ...]:
         return ("height_m",)
+
+    def raised(self, height_m: float) -> CurvedBed:
+        """The same bed, ``height_m`` higher."""
+        return replace(self, height_m=self.height_m + height_m)
 
     def energy_and_gradient(self, positions_m: Floats) -> tuple[float, Floats]:
         """Energy [J] and its gradient (nodes, 3) [N]; zero above the bed."""

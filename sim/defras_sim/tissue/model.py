@@ -160,6 +160,11 @@ class TissueModel:
     def grasped_arms(self) -> tuple[str, ...]:
         return tuple(self._held.grasps)
 
+    @property
+    def tips(self) -> Tips:
+        """Where the tips of the arms that hold tissue are."""
+        return self._held.tips
+
     def grasp(self, arm: str, tissue_from_tip: Pose) -> None:
         """Take hold of the disc of the upper face that lies nearest to the tip as things stand.
 

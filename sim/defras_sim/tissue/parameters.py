@@ -57,7 +57,18 @@ class TipMotion:
     arm: str
 
 
-Parameter = TermParameter | HoleStiffness | HoleStiffnesses | AttachmentHeight | TipMotion
+@dataclass(frozen=True)
+class GraspShift:
+    """How far [m] the patch that an arm holds sits away from where it sits in the jaw, in the
+    direction ``along`` (3,) as seen from the tip."""
+
+    arm: str
+    along: tuple[float, float, float]
+
+
+Parameter = (
+    TermParameter | HoleStiffness | HoleStiffnesses | AttachmentHeight | TipMotion | GraspShift
+)
 
 
 @dataclass(frozen=True)
@@ -139,7 +150,7 @@ def _change_of(parameter: Parameter, balance: Balance) -> Change:
     Raises:
         ValueError: there is no such term, parameter, hole or holding arm.
     """
-    if isinstance(parameter, TipMotion):
+    if isinstance(parameter, TipMotion | GraspShift):
         grasp = balance.grasps.get(parameter.arm)
         if grasp is None:
             raise ValueError(
@@ -148,7 +159,11 @@ def _change_of(parameter: Parameter, balance: Balance) -> Change:
             )
         name = term_name(parameter.arm)
         stiffness = balance.pulls(name).stiffness_n_per_m
-        return SpringChange(stiffness @ grasp.targets_by_tip_m(), name)
+        by_tip = grasp.targets_by_tip_m()
+        if isinstance(parameter, GraspShift):
+            along = grasp.tissue_from_tip.rotation @ np.array(parameter.along)
+            by_tip = by_tip[:, :, :3] @ along[:, None]
+        return SpringChange(stiffness @ by_tip, name)
     if isinstance(parameter, AttachmentHeight):
         upwards = np.tile(np.outer(ROW_SHIFTS, (0.0, 0.0, 1.0)), (balance.holes, 1))
         stiffness = balance.pulls(ATTACHMENTS).stiffness_n_per_m

@@ -26,8 +26,7 @@ class Prestress(MaterialTerm):
     stress_pa: Floats
     strength: float = 1.0
     name: str = "prestress"
-
-    parameters = (_STRENGTH,)
+    parameters: tuple[str, ...] = (_STRENGTH,)
 
     def with_stress(self, stress_pa: Floats) -> Prestress:
         """The same term with another field."""

@@ -62,17 +62,16 @@ def largest_principal_stress(terms: Iterable[Term], positions_m: Floats) -> tupl
     """Largest principal Cauchy stress [Pa] of all material terms together, and where (3,) it acts.
 
     Raises:
-        ValueError: none of ``terms`` is an elastic body.
+        ValueError: none of ``terms`` is a material.
     """
-    terms = list(terms)
-    bodies = [term for term in terms if isinstance(term, ElasticBody)]
-    if not bodies:
-        raise ValueError("stress needs an elastic body among the terms")
-    points = bodies[0].points
+    parts = [term for term in terms if isinstance(term, ElasticBody | MaterialTerm)]
+    if not parts:
+        raise ValueError("stress needs a material among the terms")
+    points = parts[0].points
     F = points.deformation(positions_m)
-    P = bodies[0].stress_pa(F)
-    for term in terms:
-        if isinstance(term, MaterialTerm):
+    P = parts[0].density_and_stress(F)[1]
+    for term in parts[1:]:
+        if not term.is_nothing:
             P = P + term.density_and_stress(F)[1]
     largest, element, point = integration.largest_principal_stress(F, P)
     corners = positions_m[points.mesh.connectivity[element]]

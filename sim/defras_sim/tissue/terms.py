@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cache
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -61,6 +61,15 @@ class Term(Protocol):
         Raises:
             ValueError: the term has no such parameter.
         """
+        ...
+
+
+@runtime_checkable
+class OnBed(Protocol):
+    """A term that moves with the bed."""
+
+    def raised(self, height_m: float) -> Term:
+        """The same on a bed that is ``height_m`` higher."""
         ...
 
 
