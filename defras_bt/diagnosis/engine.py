@@ -6,26 +6,21 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from defras_bt.diagnosis.columns import Sketch, sketch
+from defras_bt.diagnosis.beginning import begun, fitted_base
+from defras_bt.diagnosis.columns import sketch
 from defras_bt.diagnosis.confounding import confounding_of
 from defras_bt.diagnosis.diagnosis import Diagnosis
-from defras_bt.diagnosis.excess import removed_share
 from defras_bt.diagnosis.exclusion import exclusions
 from defras_bt.diagnosis.findings import Findings
 from defras_bt.diagnosis.fitting import (
-    CountedProblem,
     Fit,
-    begin,
     differentiate,
-    extend,
     refine,
 )
+from defras_bt.diagnosis.further import measure_further
 from defras_bt.diagnosis.intervals import estimates, standard_errors
-from defras_bt.diagnosis.layout import layout
-from defras_bt.diagnosis.noise import estimate_noise
 from defras_bt.diagnosis.outside import left_over
-from defras_bt.diagnosis.problem import Candidate, Problem
-from defras_bt.diagnosis.ranking import board, start_of, whitened_products
+from defras_bt.diagnosis.problem import Candidate, Problem, Remarking
 from defras_bt.diagnosis.selection import Progress, Search, select
 from defras_bt.diagnosis.sets import rivals
 from defras_bt.diagnosis.settings import Settings
@@ -70,14 +65,10 @@ def diagnose(
         _look(found, told)
         select(found.search, told)
         _settle(found, told)
-        for name, further in (("beyond_range", beyond_range), ("new_grasp", new_grasp)):
-            if further is not None:
-                told(f"the gain {name.replace('_', ' ')}", 0.9)
-                found.further[name] = removed_share(
-                    further.residual(found.base.model),
-                    further.residual(found.search.fit.model),
-                    further.samples,
-                )
+        told("what was gained on other data", 0.9)
+        measure_further(found, beyond_range, new_grasp)
+        if isinstance(problem, Remarking):
+            found.remarks += tuple(problem.remarks(found.search.fit.model))
         found.complete = True
     except KeyboardInterrupt:
         told("interrupted; what was found until now is kept", 1.0)
@@ -89,47 +80,15 @@ def _silent(sentence: str, share: float) -> None:
 
 
 def _begun(problem: Problem, settings: Settings, rng: np.random.Generator) -> Findings:
-    samples = problem.samples
-    series = layout(samples)
-    counted = CountedProblem(problem, {})
-    if len(counted.plain) != len(samples.time_s):
-        raise ValueError(
-            f"the problem's residual has {len(counted.plain)} numbers and its samples label "
-            f"{len(samples.time_s)}; there should be one label for each"
-        )
-    nothing = begin(counted, {})
-    noise = estimate_noise(counted.plain, samples, series)
-    empty = Sketch((), {})
-    search = Search(counted, samples, series, empty, settings, rng, nothing, noise)
-    return Findings(search, nothing)
+    search = begun(problem, settings, rng)
+    return Findings(search, search.fit)
 
 
 def _look(found: Findings, told: Progress) -> None:
     """Fit the base, see what each candidate would change, and what looks alike."""
     search = found.search
     problem = search.counted.problem
-    base = [c for c in problem.candidates if c.base]
-    at_null = sketch(problem, {}, base)
-    for candidate in base:
-        told(f"fitting {candidate.key}", 0.0)
-        now = board(at_null, search.fit.jacobian, search.samples.fold, [candidate.key])
-        residual = np.nan_to_num(search.fit.residual)[:, None]
-        option, amplitudes = start_of(
-            now, whitened_products(now, search.noise, residual), candidate.key, 0
-        )
-        fit = extend(
-            search.counted,
-            search.fit,
-            candidate,
-            option,
-            amplitudes,
-            search.noise,
-            iterations=search.settings.iterations,
-        )
-        if fit is None:
-            raise ValueError(f"the twin cannot follow any value of its base {candidate.key}")
-        search.fit = fit
-        search.noise = estimate_noise(fit.residual, search.samples, search.layout)
+    search.fit, search.noise = fitted_base(search, told)
     found.base = search.fit
     told("what each effect would change", 0.0)
     search.sketch = sketch(problem, found.base.model, problem.candidates, told)

@@ -19,7 +19,8 @@ def _nothing_known() -> Confounding:
 
 @dataclass
 class Findings:
-    """``base``: the model with base parameters only. ``further``: gain by name of further data."""
+    """``base``: the model with base parameters only. ``further``: gain by name of further data;
+    ``remarks``: sentences for the reader."""
 
     search: Search
     base: Fit
@@ -30,4 +31,5 @@ class Findings:
     unseen: tuple[str, ...] = ()
     left: LeftOver = field(default_factory=lambda: LeftOver(()))
     further: dict[str, float | None] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
     complete: bool = False

@@ -113,7 +113,4 @@ def _solve(gram: Floats, cross: Floats, limits: list[tuple[int, float, float]]) 
 
 def _explained(gram: Floats, cross: Floats, amplitudes: Floats) -> Floats:
     """How much smaller squares (f, s) are with ``amplitudes`` (f, k, s)."""
-    return np.asarray(
-        2.0 * np.einsum("fks,fks->fs", amplitudes, cross)
-        - np.einsum("fks,fkl,fls->fs", amplitudes, gram, amplitudes, optimize=True)
-    )
+    return np.asarray((amplitudes * (2.0 * cross - gram @ amplitudes)).sum(axis=1))

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from defras_bt.diagnosis.autoregression import is_stationary, stationary_covariance
 from defras_bt.diagnosis.layout import Layout, Series
 from defras_bt.diagnosis.problem import Channel, Samples
-from defras_bt.diagnosis.whitening import companion, innovations, stationary_covariance
+from defras_bt.diagnosis.whitening import innovations
 from defras_sim.geometry import Floats
 
 _ORDERS = (0, 1, 2, 3, 4, 6, 8)
@@ -25,7 +26,8 @@ _SHARED = 300.0
 autocorrelation: short series borrow, long ones keep their own."""
 _LARGEST = 4.0
 """Robust standard deviations beyond which a residual is an outlier."""
-_LARGEST_ROOT = 0.998
+_WILDEST = 2.0
+"""Variance that an autoregression may imply, of the one that was seen."""
 
 
 @dataclass(frozen=True)
@@ -175,9 +177,6 @@ def _stable(ar: Floats, innovation_sd: float, sd: float) -> ChannelNoise:
     """Pull roots inwards until the process is stationary and not wilder than what was seen."""
     if not len(ar):
         return ChannelNoise(sd, ar, innovation_sd * sd)
-    root = float(np.abs(np.linalg.eigvals(companion(ar))).max())
-    if root > _LARGEST_ROOT:
-        ar = ar * (_LARGEST_ROOT / root) ** np.arange(1, len(ar) + 1)
-    while stationary_covariance(ar, innovation_sd)[0, 0] > 2.0:
+    while not is_stationary(ar) or stationary_covariance(ar, innovation_sd)[0, 0] > _WILDEST:
         ar = ar * 0.998 ** np.arange(1, len(ar) + 1)
     return ChannelNoise(sd, ar, innovation_sd * sd)

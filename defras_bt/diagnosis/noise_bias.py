@@ -14,11 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from defras_bt.diagnosis.autoregression import (
+    autoregression,
+    partial_autocorrelations,
+    stationary_covariance,
+)
 from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise import ChannelNoise, Noise, estimate_noise
 from defras_bt.diagnosis.problem import Samples
 from defras_bt.diagnosis.surrogates import surrogates
-from defras_bt.diagnosis.whitening import stationary_covariance
 from defras_sim.geometry import Floats
 
 _SURELY_STATIONARY = 0.999
@@ -75,22 +79,3 @@ def _channel(numbers: Floats) -> ChannelNoise:
     if len(ar):
         sd = float(np.sqrt(stationary_covariance(ar, innovation_sd)[0, 0]))
     return ChannelNoise(sd, ar, innovation_sd)
-
-
-def partial_autocorrelations(ar: Floats) -> Floats:
-    """Of a stationary autoregression ``ar`` (p,), by Levinson's recursion backwards."""
-    left = np.array(ar, dtype=float)
-    found = np.zeros(len(left))
-    for order in range(len(left), 0, -1):
-        last = left[order - 1]
-        found[order - 1] = last
-        left = (left[: order - 1] + last * left[: order - 1][::-1]) / (1.0 - last**2)
-    return found
-
-
-def autoregression(partial: Floats) -> Floats:
-    """The autoregression with these partial autocorrelations (p,), each within (-1, 1)."""
-    ar = np.zeros(0)
-    for last in partial:
-        ar = np.append(ar - last * ar[::-1], last)
-    return ar

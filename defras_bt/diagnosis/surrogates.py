@@ -61,14 +61,15 @@ def _draw(
     nearest = np.rint(np.linspace(0.0, last, size // 2 + 1)).astype(np.int64)
     reach = max(3, last // 10)
     colour = np.stack([_colour(noise.channels[one.channel], size) for one in group], axis=1)
-    for column in range(drawn.shape[1]):
-        source = np.abs(nearest + rng.integers(-reach, reach + 1, len(nearest)))
-        source = np.clip(np.where(source > last, 2 * last - source, source), 1, last)
-        turned = coefficients[source] * np.exp(2j * np.pi * rng.random(len(nearest)))[:, None]
-        turned[0] = np.sqrt(2.0) * turned[0].real
-        series = irfft(turned * colour, size, axis=0)
-        for index, one in enumerate(group):
-            drawn[one.rows, column] = series[one.slot, index]
+    shape = (len(nearest), drawn.shape[1])
+    source = np.abs(nearest[:, None] + rng.integers(-reach, reach + 1, shape))
+    source = np.clip(np.where(source > last, 2 * last - source, source), 1, last)
+    turn = np.exp(2j * np.pi * rng.random(shape))
+    # Of the mean only the real part counts, which has half of the power.
+    turn[0] *= np.sqrt(2.0)
+    for index, one in enumerate(group):
+        own = coefficients[:, index][source] * turn * colour[:, index, None]
+        drawn[one.rows] = irfft(own, size, axis=0)[one.slot]
 
 
 def _colour(noise: ChannelNoise, size: int) -> Floats:

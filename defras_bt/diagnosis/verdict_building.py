@@ -140,8 +140,4 @@ def _warnings(found: Findings, outside: bool) -> tuple[str, ...]:
             f"{key} changes nothing that was measured in these motions, so nothing can be said "
             "about it."
         )
-    for name, gain in found.further.items():
-        if gain is not None and gain < 0.0:
-            place = name.replace("_", " ")
-            sentences.append(f"The extended model is worse than the plain one {place}.")
-    return tuple(sentences)
+    return (*sentences, *found.remarks)

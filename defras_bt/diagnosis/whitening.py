@@ -9,25 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from scipy.linalg import solve_discrete_lyapunov
 
+from defras_bt.diagnosis.autoregression import stationary_covariance
 from defras_bt.diagnosis.problem import Integers
 from defras_sim.geometry import Floats
-
-
-def companion(ar: Floats) -> Floats:
-    """Transition (p, p) of the state (x_t, ..., x_{t-p+1}) for coefficients ``ar`` (p,)."""
-    order = len(ar)
-    step = np.eye(order, k=-1)
-    step[0] = ar
-    return step
-
-
-def stationary_covariance(ar: Floats, innovation_sd: float) -> Floats:
-    """Covariance (p, p) of p successive values of the process."""
-    driving = np.zeros((len(ar), len(ar)))
-    driving[0, 0] = innovation_sd**2
-    return np.asarray(solve_discrete_lyapunov(companion(ar), driving))
 
 
 def innovations(values: Floats, slot: Integers, ar: Floats, innovation_sd: float) -> Floats:

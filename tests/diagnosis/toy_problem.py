@@ -127,7 +127,7 @@ class ToyProblem:
                 block = np.arange(length) * self.blocks // length
                 fold.append(block + (t * self.blocks))
         self._samples = Samples(
-            tuple(Channel(n, n, "deg", self.noise_sd, self.floor) for n in names),
+            tuple(Channel(n, "joints", "deg", self.noise_sd, self.floor) for n in names),
             tuple(f"run {t}" for t in range(len(self.setpoints))),
             ("move",),
             np.concatenate(time),
