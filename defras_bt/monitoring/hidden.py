@@ -56,11 +56,12 @@ def seen_places(
     if len(triangles) == 0:
         return seen
     tiles = picture_tiles(in_camera_m, triangles, intrinsics, size_px, _TILE_FOR_ALL)
-    first, listed, pyramids = tiles.first, tiles.listed, _pyramids(in_camera_m, triangles)
+    first, listed, grid = tiles.first, tiles.listed, tiles.grid
+    pyramids = _pyramids(in_camera_m, triangles)
     for t in range(len(triangles)):
         for s in range(len(places)):
             at = _place(in_camera_m, triangles, t, places, s)
-            tile = tile_at(tiles, at, intrinsics, size_px)
+            tile = tile_at(grid, at, intrinsics, size_px)
             seen[t, s] = tile >= 0 and not _hidden(
                 at, t, pyramids, listed, first[tile], first[tile + 1]
             )
@@ -83,14 +84,15 @@ def touched_vertices(
     if len(triangles) == 0:
         return touched
     tiles = picture_tiles(in_camera_m, triangles, intrinsics, size_px, _TILE_FOR_ANY)
-    first, listed, pyramids = tiles.first, tiles.listed, _pyramids(in_camera_m, triangles)
+    first, listed, grid = tiles.first, tiles.listed, tiles.grid
+    pyramids = _pyramids(in_camera_m, triangles)
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         if touched[a] and touched[b] and touched[c]:
             continue
         for s in range(len(places)):
             at = _place(in_camera_m, triangles, t, places, s)
-            tile = tile_at(tiles, at, intrinsics, size_px)
+            tile = tile_at(grid, at, intrinsics, size_px)
             if tile >= 0 and not _hidden(at, t, pyramids, listed, first[tile], first[tile + 1]):
                 touched[a] = touched[b] = touched[c] = True
                 break

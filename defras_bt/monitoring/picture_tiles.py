@@ -15,19 +15,23 @@ BEHIND_M = 1e-9
 Point = tuple[float, float, float]
 
 
-class PictureTiles(NamedTuple):
-    """Tile i, counted by columns, lists the triangles ``listed[first[i] : first[i + 1]]``.
+class TileGrid(NamedTuple):
+    """Tiles by columns. ``left_px`` and ``top_px``: corner of the first; ``per_px``: one over the
+    side of each."""
 
-    ``left_px`` and ``top_px`` are the corner of the first tile, ``per_px`` is one over their side.
-    """
-
-    first: NDArray[np.int64]
-    listed: NDArray[np.int64]
     left_px: float
     top_px: float
     per_px: float
     columns: int
     rows: int
+
+
+class PictureTiles(NamedTuple):
+    """Tile i of ``grid`` lists the triangles ``listed[first[i] : first[i + 1]]``."""
+
+    first: NDArray[np.int64]
+    listed: NDArray[np.int64]
+    grid: TileGrid
 
 
 @jit
@@ -52,11 +56,11 @@ def picture_tiles(
     per_px = np.sqrt(len(triangles) / area_px) / side
     columns, rows = int((right - left) * per_px) + 1, int((bottom - top) * per_px) + 1
     first, listed = _listed(boxes, left, top, per_px, columns, rows)
-    return PictureTiles(first, listed, left, top, per_px, columns, rows)
+    return PictureTiles(first, listed, TileGrid(left, top, per_px, columns, rows))
 
 
 @jit
-def tile_at(tiles: PictureTiles, at: Point, intrinsics: Floats, size_px: Floats) -> int:
+def tile_at(grid: TileGrid, at: Point, intrinsics: Floats, size_px: Floats) -> int:
     """The tile that a place in camera coordinates appears in; -1 if it is not in the picture."""
     x, y, z = at
     if z <= BEHIND_M:
@@ -66,9 +70,9 @@ def tile_at(tiles: PictureTiles, at: Point, intrinsics: Floats, size_px: Floats)
     down = intrinsics[1, 1] * y * inverse + intrinsics[1, 2]
     if not (-0.5 <= across <= size_px[0] - 0.5 and -0.5 <= down <= size_px[1] - 0.5):
         return -1
-    column = min(max(int((across - tiles.left_px) * tiles.per_px), 0), tiles.columns - 1)
-    row = min(max(int((down - tiles.top_px) * tiles.per_px), 0), tiles.rows - 1)
-    return column * tiles.rows + row
+    column = min(max(int((across - grid.left_px) * grid.per_px), 0), grid.columns - 1)
+    row = min(max(int((down - grid.top_px) * grid.per_px), 0), grid.rows - 1)
+    return column * grid.rows + row
 
 
 @jit
