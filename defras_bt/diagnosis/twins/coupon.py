@@ -114,7 +114,7 @@ class CouponProblem(TableProblem):
         for run in self.runs:
             force_n = self._force_n(model, run)
             held = _phases(run) == PHASES.index("holding")
-            holds.append(last_hold(run.stretch, run.force_n, force_n, held, run.time_s))
+            holds.append(last_hold(run.time_s, run.stretch, run.force_n, force_n, held))
         found = linearity_remark([hold for hold in holds if hold is not None])
         return [found] if found else []
 
