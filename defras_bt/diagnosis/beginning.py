@@ -9,7 +9,7 @@ from defras_bt.diagnosis.fitting import CountedProblem, Fit, begin, extend
 from defras_bt.diagnosis.layout import layout
 from defras_bt.diagnosis.noise import Noise, estimate_noise
 from defras_bt.diagnosis.problem import Problem
-from defras_bt.diagnosis.ranking import board, start_of, whitened_products
+from defras_bt.diagnosis.ranking import board, score, start_of, whitened_products
 from defras_bt.diagnosis.selection import Progress, Search
 from defras_bt.diagnosis.settings import Settings
 
@@ -57,7 +57,7 @@ def start_and_extend(
     if not now.of_option[key]:
         return None
     found = whitened_products(now, noise, np.nan_to_num(fit.residual)[:, None])
-    option, amplitudes = start_of(now, found, key, 0)
+    option, amplitudes = start_of(now, found, key, int(score(now, found).option[key][0]))
     return extend(
         search.counted,
         fit,

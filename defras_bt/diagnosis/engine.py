@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -21,11 +22,12 @@ from defras_bt.diagnosis.further import measure_further
 from defras_bt.diagnosis.intervals import estimates, standard_errors
 from defras_bt.diagnosis.outside import left_over
 from defras_bt.diagnosis.problem import Candidate, Problem, Remarking
-from defras_bt.diagnosis.selection import Progress, Search, select
+from defras_bt.diagnosis.selection import Progress, select
 from defras_bt.diagnosis.sets import rivals
 from defras_bt.diagnosis.settings import Settings
 from defras_bt.diagnosis.verdict_building import diagnosis_of
 from defras_sim.effects.effect import Extension, Values
+from defras_sim.geometry import Floats
 
 
 @runtime_checkable
@@ -36,6 +38,10 @@ class KnowsItsOwnErrors(Protocol):
         """Standard error by parameter, in its unit, that more data would not lessen (the fit
         repeated on another mesh)."""
         ...
+
+
+_NARROWEST, _WIDEST = 0.02, 2.0
+"""Steps over which derivatives are taken."""
 
 
 def diagnose(
@@ -100,8 +106,7 @@ def _settle(found: Findings, told: Progress) -> None:
     search = found.search
     if search.fit.free:
         told("how well parameters are known", 0.5)
-        search.fit = _arrived(search)
-        _measure_intervals(found)
+        _arrived(found)
     for key in search.accepted():
         found.rivals[key] = rivals(search, key, found.confounding, told)
     told("what is left over", 0.7)
@@ -113,25 +118,28 @@ def _settle(found: Findings, told: Progress) -> None:
     found.excluded, found.unseen = exclusions(search)
 
 
-def _arrived(search: Search) -> Fit:
-    """The fit with fresh derivatives, and what they still gain."""
-    fresh = differentiate(search.counted, search.fit)
-    return refine(search.counted, fresh, search.noise, iterations=2)
-
-
-def _measure_intervals(found: Findings) -> None:
+def _arrived(found: Findings) -> None:
+    """Fresh derivatives of the fit, what they still gain, and the intervals that follow."""
     search = found.search
-    errors = standard_errors(
-        search.fit.jacobian,
-        search.fit.residual,
-        search.noise,
-        search.samples,
-        search.settings.surrogates,
-        search.rng,
-    )
+
+    def errors(fit: Fit) -> Floats:
+        return standard_errors(
+            fit.jacobian,
+            fit.residual,
+            search.noise,
+            search.samples,
+            search.settings.surrogates,
+            search.rng,
+        )
+
+    widths = np.clip(errors(search.fit), _NARROWEST, _WIDEST)
+    fresh = differentiate(search.counted, search.fit, widths)
+    search.fit = refine(search.counted, fresh, search.noise, iterations=2)
+    # The steps just made keep derivatives current on too small a scale.
+    known = errors(replace(search.fit, jacobian=fresh.jacobian))
     problem = search.counted.problem
     for candidate in search.fit.candidates:
         systematic: Values = {}
         if isinstance(problem, KnowsItsOwnErrors):
             systematic = problem.systematic(search.fit.model, candidate)
-        found.estimates[candidate.key] = estimates(search.fit, candidate, errors, systematic)
+        found.estimates[candidate.key] = estimates(search.fit, candidate, known, systematic)

@@ -7,7 +7,7 @@ where those do not name single parameters, and are kept current by Broyden's ran
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -22,6 +22,8 @@ _DIFFERENCE = 0.25
 """Of a parameter's step: wide enough to see past a solver's tolerance."""
 _SMALLEST_GAIN = 1e-3
 """Relative gain of a step after which a fit has arrived."""
+_FINEST = 0.2
+"""Of a parameter's step: strides below it are left to derivatives."""
 
 
 class CountedProblem:
@@ -206,19 +208,50 @@ def refine(counted: CountedProblem, fit: Fit, noise: Noise, *, iterations: int) 
     )
 
 
-def differentiate(counted: CountedProblem, fit: Fit) -> Fit:
-    """``fit`` with its derivatives measured anew where it arrived."""
+def differentiate(counted: CountedProblem, fit: Fit, widths: Floats) -> Fit:
+    """``fit`` with its derivatives measured anew where it arrived, as differences over ``widths``
+    (k,) steps to both sides: over about what the parameters are uncertain by, a twin that is rough
+    on a smaller scale is judged by what matters."""
     before = counted.calls
-    jacobian = _jacobian(counted, fit, [None] * len(fit.free))
-    return Fit(
-        fit.candidates,
-        fit.model,
-        fit.free,
-        fit.residual,
-        jacobian,
-        counted.calls - before,
-        fit.start,
-    )
+    columns = []
+    for (key, p), width in zip(fit.free, widths, strict=True):
+        candidate = next(c for c in fit.candidates if c.key == key)
+        value = _value(fit.model, fit.candidates, key, p)
+        ends = np.clip((value - width * p.step, value + width * p.step), p.lower, p.upper)
+        below, above = (
+            counted.residual(added(fit.model, candidate, {p.name: float(end)})) for end in ends
+        )
+        span = (ends[1] - ends[0]) / p.step
+        columns.append(np.nan_to_num(below - above) / max(float(span), 1e-12))
+    calls = fit.calls + counted.calls - before
+    return replace(fit, jacobian=np.stack(columns, axis=1), calls=calls)
+
+
+def walked(counted: CountedProblem, fit: Fit, key: str, noise: Noise) -> Fit:
+    """``fit`` after trying both neighbours of each of a candidate's parameters, near and nearer:
+    for causes whose derivatives lead astray, as play and slip."""
+    before = counted.calls
+    candidate = next(c for c in fit.candidates if c.key == key)
+    model, residual = fit.model, fit.residual
+    loss = _loss(noise, residual)
+    for p in candidate.free:
+        stride = p.step
+        while stride > _FINEST * p.step:
+            value = _value(model, fit.candidates, key, p)
+            better = False
+            for there in (value - stride, value + stride):
+                if not p.lower <= there <= p.upper:
+                    continue
+                trial = added(model, candidate, {p.name: there})
+                found = counted.residual(trial)
+                if np.isfinite(found).any() and _loss(noise, found) < loss:
+                    model, residual, loss = trial, found, _loss(noise, found)
+                    better = True
+                    break
+            if not better:
+                stride /= 2.0
+    calls = fit.calls + counted.calls - before
+    return replace(fit, model=model, residual=residual, calls=calls)
 
 
 def _bounded_step(

@@ -17,7 +17,7 @@ from defras_bt.diagnosis.chance import known_noise, maxima
 from defras_bt.diagnosis.columns import Sketch
 from defras_bt.diagnosis.diagnosis import Ranked, RankedPair, Round, Trial
 from defras_bt.diagnosis.excess import is_practical
-from defras_bt.diagnosis.fitting import CountedProblem, Fit, conflicts, extend, without
+from defras_bt.diagnosis.fitting import CountedProblem, Fit, conflicts, extend, walked, without
 from defras_bt.diagnosis.held_out import Products
 from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise import Noise, estimate_noise
@@ -164,6 +164,8 @@ def _forward(search: Search, told: Progress) -> bool:
         return False
     search.fits[accepted.key] = fits
     search.fit = fits[accepted.key]
+    if len(now.of_option[accepted.key]) > 1:
+        search.fit = walked(search.counted, search.fit, accepted.key, after)
     search.history.append(search.fit)
     search.noise = after
     return True
