@@ -161,11 +161,7 @@ def _scatter(table: Table, joint: JointName, error: Floats) -> float:
 
 def _samples(runs: Sequence[JointRun], joints: Sequence[int]) -> Samples:
     """Labels of what is compared, by run, joint, time."""
-    noise_sd = np.sqrt(np.nanmean([run.noise_sd**2 for run in runs], axis=0))
-    channels = tuple(
-        Channel(JOINTS[i], JOINTS[i], unit(JOINTS[i]), float(noise_sd[i]), _FLOOR[unit(JOINTS[i])])
-        for i in joints
-    )
+    channels = tuple(_channel(runs, i) for i in joints)
     folds = fold_of_rows([len(run.time_s) for run in runs])
     count = len(joints)
     return Samples(
@@ -180,6 +176,12 @@ def _samples(runs: Sequence[JointRun], joints: Sequence[int]) -> Samples:
         phase=np.concatenate([_phases(run.setpoint[:, joints]) for run in runs]),
         fold=np.concatenate([np.tile(fold, count) for fold in folds]),
     )
+
+
+def _channel(runs: Sequence[JointRun], index: int) -> Channel:
+    joint = JOINTS[index]
+    variance = np.nanmean([run.noise_sd[index] ** 2 for run in runs])
+    return Channel(joint, joint, unit(joint), float(np.sqrt(variance)), _FLOOR[unit(joint)])
 
 
 def _phases(setpoint: Floats) -> np.ndarray:
