@@ -8,6 +8,7 @@ from py_trees.common import Status
 from pydantic import Field
 
 from defras_bt.acting.jaw import JAW_TIME_OUT_S
+from defras_bt.executive.blackboard import Grip
 from defras_bt.executive.node import Node, NodeParameters, Role
 from defras_bt.executive.reasons import Code, Remedy
 from defras_bt.executive.recovery import RecoveryLeaf
@@ -52,6 +53,12 @@ class GripUnsafe(Node):
         return last is not None and last.warning_state >= 2 and last.tick < board.inputs.tick
 
 
+class LetGoParameters(NodeParameters):
+    """``again``: the same points may be grasped once more, unless it is for the second time."""
+
+    again: bool = False
+
+
 @register_node
 class LetGo(RecoveryLeaf):
     """Open the jaws that hold tissue, without moving a tip, and block their grasp points.
@@ -61,6 +68,8 @@ class LetGo(RecoveryLeaf):
 
     remedy: ClassVar[Remedy] = Remedy.LET_GO
     opens_jaws: ClassVar[bool] = True
+    Parameters = LetGoParameters
+    parameters: LetGoParameters
 
     def initialise(self) -> None:
         self._started_s = self.context.board.inputs.time_s
@@ -70,18 +79,22 @@ class LetGo(RecoveryLeaf):
         if not board.grips:
             return self.succeed(Code.LET_GO, "no arm holds tissue any more")
         for arm, grip in board.grips.items():
-            if grip.point not in board.blocked:
-                board.blocked.add(grip.point)
-                board.tell(
-                    "hold",
-                    f"{arm.upper()} lets go of the tissue at {grip.point}; "
-                    "this grasp point will not be used again.",
-                    "warning",
-                )
+            self._give_up(arm, grip)
             board.move(arm, ArmCommand(jaw_rad=JAW_OPEN_RAD))
         if board.inputs.time_s - self._started_s > JAW_TIME_OUT_S:
             return self._stuck()
         return self.run(Code.OPENING, "letting go of the tissue")
+
+    def _give_up(self, arm: str, grip: Grip) -> None:
+        """Remember the point, and tell of it once."""
+        board, point = self.context.board, grip.point
+        gone, known = f"{arm.upper()} lets go of the tissue at {point}; ", board.slipped.get(point)
+        if self.parameters.again and known is None:
+            board.slipped[point] = grip
+            board.tell("hold", f"{gone}it may be grasped there once more.", "warning")
+        elif not (self.parameters.again and known is grip) and point not in board.blocked:
+            board.blocked.add(point)
+            board.tell("hold", f"{gone}this grasp point will not be used again.", "warning")
 
     def _stuck(self) -> Status:
         """Tissue that must be let go and cannot be: only a human can help."""

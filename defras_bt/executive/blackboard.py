@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from defras_bt.diagnosis.mismatch.finding import MismatchFinding
 from defras_bt.executive.ports import PortValues
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import GridPoint, Plan
@@ -70,7 +71,10 @@ class Blackboard:
     ``metric`` names the discrepancy whose warning state counts; None for a tree without monitoring.
     ``command`` and ``rate`` start every tick at hold and 1: a rate is always taken from its
     nominal value, never from the tick before. ``force_over_s`` is how long the force has been over
-    its threshold or unknown without a break. ``unexplained``: learning last failed. ``failure`` is
+    its threshold or unknown without a break. ``unexplained``: learning last failed.
+    ``mismatch``: what a diagnosis since the grasp found. ``slipped``: the first grip at each point
+    that was given up for a slip.
+    ``failure`` is
     what recoveries of this tick have to mend: why the plan was not carried on, or what the last
     recovery could not do.
     ``plan_belief`` (holes,) marks the attachments that the plan was made with; ``plan_exposing``
@@ -102,6 +106,8 @@ class Blackboard:
     force_over_s: float = 0.0
     last_learning: LearningAttempt | None = None
     unexplained: bool = False
+    mismatch: MismatchFinding | None = None
+    slipped: dict[GridPoint, Grip] = field(default_factory=dict)
     operator_refused: str | None = None
     outcome: Outcome | None = None
     outcome_cause: Cause | None = None

@@ -9,9 +9,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from defras_bt.diagnosis.mismatch.finding import MismatchService
 from defras_bt.executive.blackboard import Blackboard
 from defras_bt.learning.estimate import AttachmentEstimator, Keyframe
 from defras_bt.planning.plan import GridPoint, Plan, Situation
+from defras_sim.geometry import Pose
 from defras_sim.retraction import Rehearsal
 from defras_sim.scene import Scene
 
@@ -36,6 +38,9 @@ class TwinService(Protocol):
 
     def set_attached(self, attached: NDArray[np.bool_]) -> object: ...
 
+    def register_camera(self, true_from_reported: Pose) -> None:
+        """What the camera reports lies moved by the pose from now on."""
+
 
 class MonitorService(Protocol):
     """The part of monitoring that nodes may touch."""
@@ -47,11 +52,16 @@ class MonitorService(Protocol):
     def twin_changed(self) -> None:
         """Forget what was seen with the twin as it was before it learned."""
 
+    def camera_registered(self) -> None:
+        """As :meth:`twin_changed`; and rest was seen by a camera elsewhere."""
+
 
 class KeyframeService(Protocol):
     """Observed shapes since the last grasp."""
 
     def frames(self) -> Sequence[Keyframe]: ...
+
+    def clear(self) -> None: ...
 
 
 Rehearse = Callable[[Scene, GridPoint, Sequence[str]], Rehearsal]
@@ -70,6 +80,7 @@ class Context:
     monitor: MonitorService
     planner: PlanningService
     estimator: AttachmentEstimator
+    mismatch: MismatchService
     keyframes: KeyframeService
     rehearse: Rehearse
     rng: np.random.Generator

@@ -124,6 +124,8 @@ class AskHuman(Task):
             return Cause(Code.PLAN_REFUSED, board.operator_refused)
         if board.inputs.missing:
             return Cause(Code.STALE, "; ".join(board.inputs.missing))
+        if board.mismatch is not None and board.mismatch.cause == "arm":
+            return Cause(Code.BLAMED, board.mismatch.sentence)
         if (board.warning_state or 0) >= 2:
             off_mm = board.mu_m * 1e3
             why = f"the tissue is {off_mm:.1f} mm away from where the model expects it"

@@ -10,6 +10,7 @@ from time import perf_counter
 
 import numpy as np
 
+from defras_bt.diagnosis.mismatch.ranking import MismatchRanking
 from defras_bt.executive.again import again_values
 from defras_bt.executive.blackboard import Blackboard, TickInputs
 from defras_bt.executive.context import Context
@@ -139,6 +140,7 @@ def operate_in(
             monitor=monitor,
             planner=injected.planner(believed),
             estimator=InverseEstimator(),
+            mismatch=MismatchRanking(),
             keyframes=keyframes,
             rehearse=TwinRehearsal(),
             rng=learning_rng,

@@ -132,6 +132,12 @@ class Code(ReasonCode):
     DUE = "due", "there is something new to learn from"
     NOT_DUE = "not_due", "nothing new was seen since the last attempt"
 
+    # Diagnosis of a mismatch
+    DIAGNOSED = "diagnosed", "somebody was found to blame for the mismatch"
+    BLAMED = "blamed", "this is to blame for the mismatch"
+    NOT_BLAMED = "not_blamed", "this was not found to be to blame for the mismatch"
+    REGISTERED = "registered", "the camera is believed to stand where it was found to stand"
+
     # Grip
     NOTHING_HELD = "nothing_held", "no arm holds tissue"
     SAFE = "safe", "the grip may be kept"

@@ -80,6 +80,17 @@ class Replay:
             self._snapshots = snapshots
         return states
 
+    def displaced(self, frame: int, shift_m: Mapping[str, Floats]) -> TissueState | None:
+        """Shape at ``frame`` if what arms hold were ``shift_m`` (3,) off their tips, with the holes
+        as they were last set; None where no equilibrium is found."""
+        self.model.restore(self._snapshots[frame])
+        tips = {
+            arm: tip.moved(shift_m[arm]) if arm in shift_m else tip
+            for arm, tip in self._keyframes[frame].tips.items()
+        }
+        state = self.model.solve(tips)
+        return state if state.converged else None
+
     def response(
         self, frame: int, stiffness_n_per_m: Floats, holes: NDArray[np.int64]
     ) -> HoleResponse:

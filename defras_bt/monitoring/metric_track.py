@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +29,7 @@ class MetricTrack:
         self._rest_m: list[float] = []
         self._raw: deque[int] = deque(maxlen=CONFIRMING_FRAMES)
         self._settling_until_s = -np.inf
+        self._rest_trusted = True
         self.calibration: RestCalibration | None = None
         self.mu_m, self.state = float("nan"), 0
 
@@ -57,6 +59,8 @@ class MetricTrack:
         """
         if self.calibration is None:
             raise RuntimeError("a metric says nothing before it was calibrated on rest values")
+        if not self._rest_trusted and value_m < self.calibration.mean_m:
+            self.calibration = replace(self.calibration, mean_m=value_m)
         self.mu_m = self.calibration.mu_m(value_m)
         raw = self.state if np.isnan(value_m) else self.calibration.state(self.mu_m)
         if stamp_s < self._settling_until_s:
@@ -65,6 +69,17 @@ class MetricTrack:
             raw = 0
         self._raw.append(raw)
         self.state = min(self._raw) if len(self._raw) == CONFIRMING_FRAMES else 0
+
+    def distrust_rest(self) -> None:
+        """Rest was seen with something wrong that is mended now: from now on the rest value is at
+        most what any frame says, so that the mended error hides no other.
+
+        Raises:
+            RuntimeError: the metric was not calibrated.
+        """
+        if self.calibration is None:
+            raise RuntimeError("a metric without rest values has none to distrust")
+        self._rest_trusted = False
 
     def settle_until(self, time_s: float) -> None:
         """Raise no state before ``time_s``, or before one frame without any."""

@@ -107,6 +107,14 @@ class WarningMonitor:
             track.forget()
         self._last = self._waiting = None
 
+    def camera_registered(self) -> None:
+        """As :meth:`twin_changed`. Where the camera stood elsewhere at rest, the rest values hold
+        its error: they are lowered to what frames say from now on."""
+        self.twin_changed()
+        for track in self._tracks.values():
+            if track.calibration is not None:
+                track.distrust_rest()
+
     def tissue_released(self, time_s: float) -> None:
         """All tissue was let go at ``time_s``: raise no state until it agrees with the twin again.
 

@@ -163,6 +163,16 @@ class ModelExtension(Part):
 
     effects: tuple[AdoptedEffect, ...] = ()
 
+    @staticmethod
+    def of(extension: Mapping[str, Mapping[str, float]]) -> ModelExtension:
+        """The effects of ``extension`` by name, in its order."""
+        return ModelExtension(
+            effects=tuple(
+                AdoptedEffect.model_validate({"effect": name, **values})
+                for name, values in extension.items()
+            )
+        )
+
     @property
     def extension(self) -> dict[str, Mapping[str, float]]:
         """Parameters of each adopted effect by its name."""

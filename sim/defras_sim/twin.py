@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defras_sim.effects.camera_layer import CameraLayer
+from defras_sim.effects.camera_registration import EFFECT as REGISTRATION
 from defras_sim.effects.extended_tissue import ExtendedTissue
 from defras_sim.effects.layers import Layers
 from defras_sim.geometry import Pose
 from defras_sim.held_motion import HeldMotion
-from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene
+from defras_sim.scene import RIGID_HOLE_N_PER_M, ModelExtension, Scene
 from defras_sim.tissue.model import NothingToGrasp
 from defras_sim.tissue.state import TissueState
 from defras_sim.worlds.protocol import PointCloud
@@ -168,6 +169,22 @@ class Twin:
     def measured(self, arm: str) -> Pose:
         """tissue_from_tip that the encoders of ``arm`` should say at the last set-point."""
         return self._motion.measured(arm)
+
+    def register_camera(self, true_from_reported: Pose) -> None:
+        """Believe that points as :meth:`corrected` gives them until now lie moved by the pose.
+
+        The scene adopts it as ``camera_registration``; a depth bias that it has beside that stays
+        as it is, which to first order changes nothing.
+
+        Raises:
+            ValueError: no camera is off so far.
+        """
+        camera, known = self._scene.depth_camera, self._scene.model.extension
+        placed = REGISTRATION.placement(known.get(REGISTRATION.name, {}), camera)
+        values = REGISTRATION.values_of(placed @ true_from_reported.inverse(), camera)
+        model = ModelExtension.of({**known, REGISTRATION.name: values})
+        self._scene = self._scene.model_copy(update={"model": model})
+        self._camera = CameraLayer(camera, Layers.of(model.extension).camera)
 
     def set_attached(self, attached: Mask) -> TissueState:
         """Believe from now on that the holes ``attached`` (holes,) hold; keep the grasps.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -41,7 +42,7 @@ def test_a_row_of_one_keeps_its_sign() -> None:
 def test_phases_follow_each_other_without_gaps() -> None:
     spans = phase_spans(samples(), 0)
     assert [name for _, _, name in spans] == list(PHASES)
-    assert all(one[1] == other[0] for one, other in zip(spans, spans[1:], strict=False))
+    assert all(one[1] == other[0] for one, other in itertools.pairwise(spans))
 
 
 def test_channels_with_phases_of_their_own_have_none_in_common() -> None:

@@ -61,6 +61,7 @@ PARAMETERS = {
     "WarningBelow": [{"state": state} for state in (1, 2, 3)],
     "WarningReached": [{"state": state} for state in (1, 2, 3)],
     "Wait": [{"seconds": 1.0}],
+    "MismatchIs": [{"cause": "grasp"}],
 }
 ALL = [(*key, index) for key, some in SITUATIONS.items() for index in range(len(some))]
 

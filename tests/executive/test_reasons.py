@@ -9,7 +9,7 @@ import pytest
 from defras_bt.executive import reasons
 from defras_bt.executive.reasons import Code, ReasonCode, Remedy, codes_table, helps
 
-LEAVES = ("acting", "monitoring", "learning", "planning", "executive")
+LEAVES = ("acting", "monitoring", "learning", "diagnosis", "planning", "executive")
 PACKAGE = Path(reasons.__file__).parent.parent
 
 

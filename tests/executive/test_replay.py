@@ -207,7 +207,7 @@ class TestChanged:
     def test_the_recorded_tree_counts_whatever_became_of_its_file(self, run, tmp_path):
         tree = read_inputs(run).setup["again"]["tree"]
         assert tree["main"] == "defras.yaml"
-        assert "learn.yaml" in tree["files"]
+        assert "diagnose.yaml" in tree["files"]
 
 
 class TestRefused:

@@ -62,3 +62,24 @@ def test_a_jaw_that_stays_shut_needs_a_human(bench):
     assert bench.board.outcome == "human"
     assert "PSM1 should let go" in bench.board.outcome_reason
     assert len(bench.told("human")) == 1
+
+
+def test_tissue_that_slipped_may_be_grasped_there_once_more(bench):
+    node = bench.node(LetGo, again=True)
+    bench.hold((2, 4))
+    bench.tick(node)
+    assert "may be grasped there once more" in bench.told("hold")[0]
+    assert bench.run(node) == Status.SUCCESS
+    assert bench.board.blocked == set()
+    bench.hold((2, 4))
+    bench.tick(node)
+    assert "will not be used again" in bench.told("hold")[0]
+    assert bench.board.blocked == {(2, 4)}
+
+
+def test_an_interrupted_release_does_not_count_twice(bench):
+    bench.world.stuck.add("psm1")
+    bench.hold((2, 4))
+    for _ in range(3):
+        bench.tick(bench.node(LetGo, again=True))
+    assert bench.board.blocked == set()

@@ -20,6 +20,7 @@ from defras_bt.executive.scripted import Script, ScriptedLeaf, StatusName
 from defras_bt.executive.testing.services import (
     MU_M,
     BenchEstimator,
+    BenchMismatch,
     BenchMonitor,
     BenchPlanner,
     BenchRehearsal,
@@ -43,7 +44,8 @@ class NodeBench:
     """A world, its services, and one blackboard.
 
     ``says`` overrides fields of :class:`TickInputs` in the next ticks. The services are attributes:
-    ``world``, ``twin``, ``monitor``, ``planner``, ``estimator``, ``keyframes``, ``rehearse``;
+    ``world``, ``twin``, ``monitor``, ``planner``, ``estimator``, ``mismatch``, ``keyframes``,
+    ``rehearse``;
     change them between two ticks. ``board`` and ``context`` are what nodes are given.
     """
 
@@ -58,6 +60,7 @@ class NodeBench:
         self.monitor = BenchMonitor()
         self.planner = BenchPlanner()
         self.estimator = BenchEstimator(self.scene)
+        self.mismatch = BenchMismatch()
         self.keyframes = KeyframeBuffer()
         self.rehearse = BenchRehearsal()
         self.failure: Cause | None = None
@@ -69,6 +72,7 @@ class NodeBench:
             monitor=self.monitor,
             planner=self.planner,
             estimator=self.estimator,
+            mismatch=self.mismatch,
             keyframes=self.keyframes,
             rehearse=self.rehearse,
             rng=np.random.default_rng(0),

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from defras_bt.diagnosis.mismatch.finding import MismatchCause, MismatchFinding
 from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import MANOEUVRES, Action, GridPoint, Plan, Situation
@@ -39,6 +40,7 @@ class BenchTwin:
         self.feels_n = 0.0
         self.broken: Exception | None = None
         self.holding: set[str] = set()
+        self.registered: list[Pose] = []
 
     @property
     def force_n(self) -> float:
@@ -60,6 +62,9 @@ class BenchTwin:
 
     def set_attached(self, attached: NDArray[np.bool_]) -> None:
         self.scene = self.scene.with_attached(attached)
+
+    def register_camera(self, true_from_reported: Pose) -> None:
+        self.registered.append(true_from_reported)
 
 
 class BenchMonitor:
@@ -101,6 +106,9 @@ class BenchMonitor:
         self.changes += 1
         if self.heals:
             self.warn(0)
+
+    def camera_registered(self) -> None:
+        self.twin_changed()
 
 
 class BenchPlanner:
@@ -164,6 +172,23 @@ class BenchEstimator:
             held_out_after_m=0.001 if self.adopts else 0.005,
             adopted=self.adopts,
             reason=reason,
+        )
+
+
+class BenchMismatch:
+    """Blames ``cause``; ``asked`` notes every question."""
+
+    def __init__(self) -> None:
+        self.cause: MismatchCause = "attachments"
+        self.asked: list[tuple[Scene, Sequence[Keyframe]]] = []
+
+    def explain(
+        self, belief: Scene, keyframes: Sequence[Keyframe], rng: np.random.Generator
+    ) -> MismatchFinding:
+        self.asked.append((belief, keyframes))
+        moved = Pose(np.array([0.003, 0.0, 0.0])) if self.cause == "camera" else None
+        return MismatchFinding(
+            self.cause, f"the {self.cause} did it", 0.004, 0.001, true_from_reported=moved
         )
 
 

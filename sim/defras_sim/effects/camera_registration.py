@@ -43,5 +43,18 @@ class CameraRegistration(CameraEffect):
         pivot_m = np.array(camera.target_m)
         return Pose(pivot_m + shift_m - turn @ pivot_m, turn)
 
+    def values_of(self, placement: Pose, camera: Camera) -> dict[str, float]:
+        """The parameters whose :meth:`placement` is ``placement`` (reported_from_true).
+
+        Raises:
+            ValueError: it is farther than any camera is off.
+        """
+        pivot_m = np.array(camera.target_m)
+        shift_m = placement.apply(pivot_m) - pivot_m
+        turn_rad = Rotation.from_matrix(placement.rotation).as_rotvec()
+        values = {f"{a}_m": float(shift_m[i]) for i, a in enumerate(_AXES)}
+        values |= {f"turn_{a}_rad": float(turn_rad[i]) for i, a in enumerate(_AXES)}
+        return self.complete(values)
+
 
 EFFECT = CameraRegistration()

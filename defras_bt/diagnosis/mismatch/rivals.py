@@ -1,0 +1,170 @@
+"""Explanations of a mismatch that leave the attachments as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from defras_bt.diagnosis.mismatch.finding import MismatchCause
+from defras_bt.learning.estimate import Keyframe
+from defras_bt.learning.misfit import misfit
+from defras_bt.learning.registration import fitted_registration
+from defras_bt.learning.replay import Replay
+from defras_sim.geometry import Floats, Pose
+from defras_sim.scene import Camera
+from defras_sim.surface import Surface
+
+STILL = Pose(np.zeros(3))
+
+_PROBE_M = 0.003
+_ITERATIONS = 8
+_ROBUST_M = 0.004
+_FARTHEST_M = 0.04
+_ALONG = 0.8
+"""Cosine with the way back to where tissue was taken from which on it has slipped."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """One explanation: the surface and the true_from_reported of each keyframe.
+
+    ``size`` says in words how much it takes.
+    """
+
+    cause: MismatchCause
+    surfaces: tuple[Surface, ...]
+    moved: tuple[Pose, ...]
+    size: str
+
+
+def moved_cameras(
+    points_m: Sequence[Floats], surfaces: Sequence[Surface], camera: Camera
+) -> Iterator[Rival]:
+    """The camera was moved before a frame, for each frame to which it could have been.
+
+    ``points_m`` are those to be fitted (n, 3), empty for frames that are not.
+    """
+    fitted = [i for i, points in enumerate(points_m) if len(points)]
+    for number, first in enumerate(fitted):
+        later = fitted[number:]
+        found = fitted_registration(
+            [points_m[i] for i in later], [surfaces[i] for i in later], camera
+        )
+        if found is None:
+            continue
+        # Frames between the last one not moved and this one may belong to either.
+        begin = fitted[number - 1] + 1 if number else 0
+        for onset in range(begin, first + 1):
+            moved = tuple(found if i >= onset else STILL for i in range(len(surfaces)))
+            pivot_m = np.array(camera.target_m)
+            shift_mm = 1e3 * float(np.linalg.norm(found.apply(pivot_m) - pivot_m))
+            turn_deg = np.degrees(float(Rotation.from_matrix(found.rotation).magnitude()))
+            size = f"by {shift_mm:.1f} mm and {turn_deg:.1f} degrees"
+            yield Rival("camera", tuple(surfaces), moved, size)
+
+
+def moved_patches(
+    points_m: Sequence[Floats],
+    replay: Replay,
+    keyframes: Sequence[Keyframe],
+    surfaces: Sequence[Surface],
+    camera: Camera,
+) -> Iterator[Rival]:
+    """What an arm holds has been elsewhere than its tip since a frame.
+
+    Back towards where it was taken, it slipped in the jaw; in any other direction, the arm is not
+    where it is told to be. The stiffness of the holes is that of the replay's last call.
+    """
+    fitted = [i for i, points in enumerate(points_m) if len(points)]
+    for arm in keyframes[0].tips:
+        linear = {i: _slopes(replay, i, arm, surfaces[i]) for i in fitted}
+        for number, first in enumerate(fitted):
+            begin = fitted[number - 1] + 1 if number else 0
+            found = _fitted_shift(points_m, surfaces, linear, fitted[number:], camera)
+            if found is None:
+                continue
+            for onset in range(begin, first + 1):
+                rival = _patch(replay, keyframes, surfaces, arm, found, onset)
+                if rival is not None:
+                    yield rival
+
+
+def _slopes(replay: Replay, frame: int, arm: str, surface: Surface) -> Floats | None:
+    """Motion (vertices, 3, 3) of the surface per metre of motion of the held patch along x, y, z;
+    None where the model does not follow."""
+    columns = []
+    for axis in np.eye(3):
+        state = replay.displaced(frame, {arm: _PROBE_M * axis})
+        if state is None:
+            return None
+        columns.append((state.surface.vertices_m - surface.vertices_m) / _PROBE_M)
+    return np.stack(columns, axis=2)
+
+
+def _fitted_shift(
+    points_m: Sequence[Floats],
+    surfaces: Sequence[Surface],
+    linear: dict[int, Floats | None],
+    frames: Sequence[int],
+    camera: Camera,
+) -> Floats | None:
+    """Shift (3,) of the patch that brings ``frames`` closest to their points, by the slopes.
+
+    Gauss-Newton with Huber's weights; None where the model does not follow, or sees nothing.
+    """
+    shift_m = np.zeros(3)
+    for _ in range(_ITERATIONS):
+        rows, sides = [], []
+        for frame in frames:
+            slopes, before = linear[frame], surfaces[frame]
+            if slopes is None:
+                return None
+            vertices_m = before.vertices_m + slopes @ shift_m
+            surface = Surface(vertices_m, before.triangles, before.upper, before.rest_xy_m)
+            compared = misfit(points_m[frame], surface, camera)
+            if compared is None:
+                return None
+            weight = np.sqrt(
+                np.minimum(1.0, _ROBUST_M / np.maximum(np.abs(compared.residual_m), 1e-12))
+            )
+            rows.append(weight[:, None] * compared.jacobian(slopes))
+            sides.append(-weight * compared.residual_m)
+        step = np.linalg.lstsq(np.concatenate(rows), np.concatenate(sides), rcond=1e-6)[0]
+        shift_m = shift_m + step
+        size_m = float(np.linalg.norm(shift_m))
+        if size_m > _FARTHEST_M:
+            shift_m *= _FARTHEST_M / size_m
+        if float(np.abs(step).max()) < 2e-5:
+            break
+    return shift_m
+
+
+def _patch(
+    replay: Replay,
+    keyframes: Sequence[Keyframe],
+    surfaces: Sequence[Surface],
+    arm: str,
+    shift_m: Floats,
+    onset: int,
+) -> Rival | None:
+    """The explanation with shapes as the model really has them; None where it does not follow."""
+    shapes = list(surfaces)
+    for frame in range(onset, len(surfaces)):
+        state = replay.displaced(frame, {arm: shift_m})
+        if state is None:
+            return None
+        shapes[frame] = state.surface
+    begun = keyframes[onset]
+    back_m = begun.grasp_tips[arm].position_m - begun.tips[arm].position_m
+    size_m, way_m = float(np.linalg.norm(shift_m)), float(np.linalg.norm(back_m))
+    along = float(shift_m @ back_m) / max(size_m * way_m, 1e-12)
+    slipped = along >= _ALONG and size_m <= way_m + _PROBE_M
+    return Rival(
+        "grasp" if slipped else "arm",
+        tuple(shapes),
+        (STILL,) * len(surfaces),
+        f"of {arm.upper()} by {1e3 * size_m:.1f} mm",
+    )

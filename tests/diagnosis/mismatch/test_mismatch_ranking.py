@@ -1,0 +1,111 @@
+"""The cause of a mismatch is found among attachments, grasp, camera and arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from defras_bt.diagnosis.mismatch.ranking import MismatchRanking
+from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
+from defras_sim.geometry import Pose
+from tests.diagnosis.mismatch.observed_pull import (
+    FRAMES,
+    GRASP,
+    PATCH,
+    WAY_M,
+    held_scene,
+    observed,
+)
+
+BACK = -WAY_M / np.linalg.norm(WAY_M)
+STILL = Pose(np.zeros(3))
+
+
+@dataclass
+class Attachments:
+    """An estimator that explains the held-out points down to ``after_m``, if it is asked."""
+
+    after_m: float = np.inf
+    asked: int = 0
+
+    def estimate(self, belief, keyframes, rng):
+        self.asked += 1
+        return AttachmentEstimate(
+            belief.attached,
+            belief.attached.astype(float),
+            1.0,
+            self.after_m,
+            adopted=np.isfinite(self.after_m),
+            reason="as the test says",
+        )
+
+
+def explain(frames: list[Keyframe], attachments: Attachments | None = None):
+    ranking = MismatchRanking(estimator=attachments or Attachments())
+    return ranking.explain(held_scene(), frames, np.random.default_rng(5))
+
+
+@pytest.fixture(scope="module")
+def slipped() -> list[Keyframe]:
+    return observed(held_scene(), slips_m=[np.zeros(3)] * 2 + [0.008 * BACK] * 3)
+
+
+def test_tissue_that_slipped_is_the_grasps_fault(slipped):
+    attachments = Attachments()
+    found = explain(slipped, attachments)
+    assert found.cause == "grasp"
+    assert "slipped in the jaw of PSM1 by" in found.sentence
+    size_mm = float(found.sentence.split("by ")[1].split(" mm")[0])
+    assert size_mm == pytest.approx(8.0, abs=2.0)
+    assert found.after_m < 0.5 * found.before_m
+    assert attachments.asked == 1
+
+
+def test_attachments_are_blamed_if_they_explain_more(slipped):
+    found = explain(slipped, Attachments(after_m=1e-4))
+    assert found.cause == "attachments"
+    assert "better than anything else" in found.sentence
+
+
+def test_a_tip_that_is_elsewhere_is_the_arms_fault():
+    found = explain(observed(held_scene(), slips_m=[np.array([0.0, 0.006, 0.0])] * FRAMES))
+    assert found.cause == "arm"
+    assert found.explained["arm"] > found.explained["camera"]
+
+
+def test_a_camera_that_was_bumped_is_moved_back():
+    bump = Pose(np.array([0.003, -0.002, 0.004])).moved(np.zeros(3), np.array([0.0, 0.03, 0.0]))
+    found = explain(observed(held_scene(), camera_moved=[STILL] * 2 + [bump] * 3))
+    assert found.cause == "camera"
+    assert found.true_from_reported is not None
+    corner_m = np.array([0.05, 0.05, 0.0])
+    back_m = found.true_from_reported.apply(bump.apply(corner_m))
+    assert np.linalg.norm(back_m - corner_m) < 0.0015
+
+
+def test_what_attachments_did_is_nobody_elses_fault():
+    """An arm that is off explains a part of it; the true estimator explains more."""
+    frames = observed(held_scene(PATCH))
+    found = MismatchRanking().explain(held_scene(), frames, np.random.default_rng(5))
+    assert found.cause == "attachments"
+
+
+def test_where_nothing_is_wrong_nothing_else_is_blamed():
+    found = explain(observed(held_scene()))
+    assert found.cause == "attachments"
+
+
+def test_without_motion_there_is_nothing_to_tell():
+    frame = observed(held_scene())[0]
+    found = explain([replace(frame, tips={"psm1": GRASP})])
+    assert found.cause == "attachments"
+    assert "not been moved far enough" in found.sentence
+    assert explain([]).cause == "attachments"
+
+
+def test_a_motion_that_cannot_be_repeated_blames_no_rival():
+    away = Pose(np.array([0.5, 0.0, 0.0]))
+    frames = [replace(frame, grasp_tips={"psm1": away}) for frame in observed(held_scene())]
+    assert "cannot be repeated" in explain(frames).sentence
