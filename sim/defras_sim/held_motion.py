@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 
 import numpy as np
 
@@ -31,6 +32,10 @@ class HeldMotion:
             name: ArmLayer(np.array(arm.rcm_m), layers.arm) for name, arm in scene.arms.items()
         }
         self._grips: dict[str, GraspLayer] = {}
+
+    def copy(self) -> HeldMotion:
+        """The same motion so far, to be continued otherwise."""
+        return deepcopy(self)
 
     @property
     def gives(self) -> bool:

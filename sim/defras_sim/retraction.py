@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from defras_sim.camera.ray_caster import RayCaster
 from defras_sim.camera.visibility import roi_visibility
+from defras_sim.effects.extended_tissue import ExtendedSnapshot, ExtendedTissue
+from defras_sim.effects.layers import Layers
 from defras_sim.geometry import Floats, Pose
+from defras_sim.held_motion import HeldMotion
 from defras_sim.motion import manoeuvre_target_m
 from defras_sim.scene import ArmName, GraspPoint, Scene
-from defras_sim.tissue.model import TissueModel, TissueSnapshot
+from defras_sim.tissue.model import NothingToGrasp
 from defras_sim.tissue.state import TissueState
 from defras_sim.worlds.kinematic_tool import POINTING_DOWN
 
@@ -84,8 +87,23 @@ def rehearse(
     return rehearser.run(grasp_point, manoeuvres)
 
 
+@dataclass(frozen=True)
+class _Stage:
+    """Where a rehearsal stands: tissue, arms, world time, and what came of it so far."""
+
+    tissue: ExtendedSnapshot
+    motion: HeldMotion
+    time_s: float
+    forces_n: Mapping[str, Floats]
+    result: Rehearsal
+
+
 class Rehearser:
-    """Rehearses many retractions of one scene; what two of them have in common is solved once."""
+    """Rehearses many retractions of one scene; what two of them have in common is solved once.
+
+    Arms, grasps and tissue have the effects that the scene adopts. World time is that of motion at
+    ``motion.tissue_speed_m_s``, and begins with the grasp.
+    """
 
     def __init__(
         self,
@@ -100,10 +118,11 @@ class Rehearser:
         self._most_force_n = most_force_n
         self._step_m = step_m
         self._enough = scene.thresholds.roi_visibility if stop_when_exposed else np.inf
-        self._model = TissueModel(scene, residual_share=_RESIDUAL_SHARE)
-        self._rest = self._model.snapshot()
-        self._known: dict[tuple[str, ...], tuple[TissueSnapshot, Rehearsal]] = {}
-        """Model snapshots and results of the point rehearsed last, by manoeuvres done."""
+        self._layers = Layers.of(scene.model.extension)
+        self._tissue = ExtendedTissue(scene, self._layers.tissue, residual_share=_RESIDUAL_SHARE)
+        self._rest = self._tissue.snapshot()
+        self._known: dict[tuple[str, ...], _Stage] = {}
+        """Stages of the point rehearsed last, by manoeuvres done."""
         self._point: GraspPoint | None = None
 
     def run(self, point: GraspPoint, manoeuvres: Sequence[str]) -> Rehearsal:
@@ -111,7 +130,7 @@ class Rehearser:
         if point != self._point:
             self._start(point)
         done: tuple[str, ...] = ()
-        result = self._known[done][1]
+        result = self._known[done].result
         for manoeuvre in manoeuvres:
             if not result.finished or result.best_visibility >= self._enough:
                 break
@@ -119,42 +138,53 @@ class Rehearser:
                 break
             ahead = (*done, manoeuvre)
             if ahead not in self._known:
-                self._model.restore(self._known[done][0])
-                after = self._carry_out(result, manoeuvre)
-                self._known[ahead] = (self._model.snapshot(), after)
-            done, result = ahead, self._known[ahead][1]
+                self._known[ahead] = self._carry_out(self._known[done], manoeuvre)
+            done, result = ahead, self._known[ahead].result
         return result
 
     def _start(self, point: GraspPoint) -> None:
-        self._model.restore(self._rest)
+        self._tissue.restore(self._rest)
         arm = arm_for(self._scene, point)
         tip_m = self._scene.grasp_point_m(*point)
-        self._model.grasp(arm, Pose(tip_m, POINTING_DOWN))
-        state = self._model.solve({arm: Pose(tip_m, POINTING_DOWN)})
+        motion = HeldMotion(self._scene, self._layers)
+        motion.follow({arm: Pose(tip_m, POINTING_DOWN)}, 0.0)
+        jaw, takes = motion.take(arm, 0.0), True
+        try:
+            self._tissue.grasp(arm, jaw)
+        except NothingToGrasp:  # an arm may be registered so wrongly that it misses the tissue
+            motion.let_go(arm)
+            takes = False
+        state = self._tissue.solve(motion.held(0.0, {}), 0.0)
         hidden = roi_visibility(self._scene, RayCaster(state.surface))
-        start = Rehearsal(arm, point, (), (), (), hidden, tip_m, tip_m, state.converged)
+        finished = takes and state.converged
+        start = Rehearsal(arm, point, (), (), (), hidden, tip_m, tip_m, finished)
         self._point = point
-        self._known = {(): (self._model.snapshot(), start)}
+        self._known = {(): _Stage(self._tissue.snapshot(), motion, 0.0, {}, start)}
 
-    def _carry_out(self, before: Rehearsal, manoeuvre: str) -> Rehearsal:
-        """``before`` and one manoeuvre more; the model stands where ``before`` ended."""
+    def _carry_out(self, stage: _Stage, manoeuvre: str) -> _Stage:
+        """One manoeuvre more."""
+        self._tissue.restore(stage.tissue)
+        motion, time_s, before = stage.motion.copy(), stage.time_s, stage.result
         best, best_at_m, tip_m = before.best_visibility, before.best_at_m, before.stopped_at_m
         goal_m = manoeuvre_target_m(self._scene, manoeuvre, tip_m)
         visibility, force_n, finished = before.visibility[-1:] or (best,), 0.0, True
-        seen = visibility[0]
+        seen, forces_n = visibility[0], stage.forces_n
         for next_m in _steps(tip_m, goal_m, self._step_m):
-            state = self._model.solve({before.arm: Pose(next_m, POINTING_DOWN)})
+            way_m = float(np.linalg.norm(next_m - tip_m))
+            time_s += way_m / self._scene.motion.tissue_speed_m_s
+            motion.follow({before.arm: Pose(next_m, POINTING_DOWN)}, time_s)
+            state = self._tissue.solve(motion.held(time_s, forces_n), time_s)
             if not state.converged:
                 finished = False
                 break
-            tip_m = next_m
+            tip_m, forces_n = next_m, state.grasp_forces_n
             force_n = max(force_n, _force_n(state))
             seen = roi_visibility(self._scene, RayCaster(state.surface))
             if seen > best:
                 best, best_at_m = seen, tip_m
             if seen >= self._enough or force_n > self._most_force_n:
                 break
-        return Rehearsal(
+        result = Rehearsal(
             arm=before.arm,
             point=before.point,
             manoeuvres=(*before.manoeuvres, manoeuvre),
@@ -165,6 +195,7 @@ class Rehearser:
             stopped_at_m=tip_m,
             finished=finished,
         )
+        return _Stage(self._tissue.snapshot(), motion, time_s, forces_n, result)
 
 
 def _steps(start_m: Floats, goal_m: Floats, step_m: float) -> Iterator[Floats]:
