@@ -17,7 +17,7 @@ from defras_bt.diagnosis.twins.tissue_correction import MeshCorrection, finer
 from defras_bt.diagnosis.twins.tissue_frames import TissueFrames, frames_of
 from defras_bt.diagnosis.twins.tissue_part import TissuePart
 from defras_bt.diagnosis.twins.tissue_phases import PHASES
-from defras_bt.diagnosis.twins.tissue_signals import Layout, noise_sd
+from defras_bt.diagnosis.twins.tissue_signals import Layout, gone_m, noise_sd
 from defras_bt.diagnosis.twins.tissue_tangents import TissueTangents
 from defras_bt.diagnosis.twins.tissue_trajectory import MOST_FRAMES, Trajectory, trajectory
 from defras_sim.effects.effect import Extension
@@ -165,6 +165,7 @@ class TissueProblem:
         noise = noise_sd(blocks, [each.phase for each in self.trajectories], kinds)
         forces = [f for each in self.trajectories for f in each.forces_n.values()]
         largest = [float(np.nanmax(np.linalg.norm(f, axis=1), initial=0.0)) for f in forces]
+        gone = np.max([gone_m(frames, self.layout.grid) for frames in plain], axis=0)
         whole = len(self.trajectories) >= WHOLE_FROM
         times, channels, owners, phases, folds = [], [], [], [], []
         for number, each in enumerate(self.trajectories):
@@ -180,7 +181,7 @@ class TissueProblem:
             phases.append(np.tile(each.phase, rows))
             folds.append(np.tile(fold, rows))
         return Samples(
-            self.layout.channels(noise, max(largest, default=0.0)),
+            self.layout.channels(noise, gone, max(largest, default=0.0)),
             tuple(each.name for each in self.trajectories),
             PHASES,
             np.concatenate(times),

@@ -16,7 +16,9 @@ from defras_sim.geometry import Floats
 from defras_sim.scene import Camera, Scene
 
 CLOUD_FLOOR_M = 0.0003
-"""Of a patch's mean distance: meshes of the twin's kind differ by as much."""
+CLOUD_FLOOR_SHARE = 0.02
+"""Of the largest way that a patch of tissue goes. Models of one and the same tissue on different
+fine meshes differ by so much: 0.4 mm on patches that go 20 mm, 0.5 mm on those that go 80."""
 FORCE_FLOOR_N = 0.005
 FORCE_FLOOR_SHARE = 0.05
 """Of the largest force measured: the twin's force is as good as that."""
@@ -84,8 +86,11 @@ class Layout:
         count = len(next(iter(predicted.values())))
         return np.asarray((measured.get(arm, np.full((count, 3), np.nan)) - predicted[arm]).T)
 
-    def channels(self, noise_sd: Floats, largest_force_n: float) -> tuple[Channel, ...]:
-        """Every row with what its sensor scatters (rows,)."""
+    def channels(
+        self, noise_sd: Floats, gone_m: Floats, largest_force_n: float
+    ) -> tuple[Channel, ...]:
+        """Every row with what its sensor scatters (rows,). ``gone_m`` (cells,): how far each patch
+        goes at most."""
         cells, force_floor_n = (
             len(self.grid),
             max(FORCE_FLOOR_N, FORCE_FLOOR_SHARE * largest_force_n),
@@ -95,7 +100,8 @@ class Layout:
             if row < cells:
                 x, y = self.grid.places_m[row]
                 sd = float(noise_sd[row])
-                found.append(Channel(name, "cloud", "m", sd, CLOUD_FLOOR_M, (float(x), float(y))))
+                floor_m = max(CLOUD_FLOOR_M, CLOUD_FLOOR_SHARE * float(gone_m[row]))
+                found.append(Channel(name, "cloud", "m", sd, floor_m, (float(x), float(y))))
             elif row < cells + 3 * len(self.with_force):
                 found.append(Channel(name, "force", "N", float(noise_sd[row]), force_floor_n))
             else:
@@ -112,6 +118,19 @@ def cloud_residual_m(
         if surface is not None:
             found[:, frame] = cloud.residual_m(frames.corrected(cloud.points_m), surface, camera)
     return found
+
+
+def gone_m(frames: TissueFrames, grid: CellGrid) -> Floats:
+    """How far each patch (cells,) lies, at most, from where it lay first."""
+    surfaces = [surface for surface in frames.surfaces if surface is not None]
+    first = surfaces[0]
+    cell = grid.cells(first.rest_xy_m, first.upper)
+    count = np.maximum(np.bincount(cell, minlength=len(grid)), 1)
+    most = np.zeros(len(grid))
+    for surface in surfaces:
+        way = np.linalg.norm(surface.vertices_m - first.vertices_m, axis=1)
+        most = np.maximum(most, np.bincount(cell, way, minlength=len(grid)) / count)
+    return most
 
 
 def noise_sd(
