@@ -130,11 +130,11 @@ class CouponProblem(TableProblem):
     ) -> Sequence[tuple[Values, Sequence[Values]]]:
         if candidate.effect.name == STRESS_RELAXATION.name:
             return [
-                ({"fraction": 0.0, "time_s": float(time_s)}, [{"fraction": 1.0}])
+                ({"fraction": 0.0, "time_s": float(time_s)}, [{"fraction": 0.5}])
                 for time_s in _times_s(self.runs)
             ]
         if candidate.effect.name == SOFTENING.name:
-            return [({"share": 0.0, "width": width}, [{"share": 1.0}]) for width in _WIDTHS]
+            return [({"share": 0.0, "width": width}, [{"share": 0.5}]) for width in _WIDTHS]
         return ()
 
 
