@@ -6,8 +6,8 @@ import numpy as np
 
 from defras_bt.diagnosis.held_out import Products, products
 from defras_bt.diagnosis.layout import Layout
-from defras_bt.diagnosis.noise import Noise
 from defras_bt.diagnosis.noise_bias import KnownNoise, corrected
+from defras_bt.diagnosis.noise_search import Beside
 from defras_bt.diagnosis.problem import Samples
 from defras_bt.diagnosis.ranking import Board, remainder, score, whitened_products
 from defras_bt.diagnosis.surrogates import surrogates
@@ -17,15 +17,11 @@ _REFITS = 20
 
 
 def known_noise(
-    board: Board,
-    noise: Noise,
-    residual: Floats,
-    samples: Samples,
-    found: Layout,
-    rng: np.random.Generator,
+    board: Board, beside: Beside, samples: Samples, found: Layout, rng: np.random.Generator
 ) -> KnownNoise:
-    """``noise`` was estimated from ``residual`` (n,), from which the best candidate was removed;
-    here without the bias of that."""
+    """Noise that was estimated beside the best candidates, without the bias of having chosen and
+    removed them."""
+    noise = beside.noise
 
     def refit(drawn: Floats) -> Floats:
         inner = whitened_products(board, noise, drawn)
@@ -40,7 +36,7 @@ def known_noise(
             left[:, column] = remainder(board, one, drawn[:, column], key, option)
         return left
 
-    return corrected(noise, residual, samples, found, refit, _REFITS, rng)
+    return corrected(noise, beside.remainder, samples, found, refit, _REFITS, rng)
 
 
 def maxima(

@@ -8,9 +8,10 @@ from scipy.stats import norm
 from defras_bt.diagnosis.chance import known_noise, surrogate_products
 from defras_bt.diagnosis.columns import Option
 from defras_bt.diagnosis.held_out import losses
+from defras_bt.diagnosis.noise_search import noise_beside
 from defras_bt.diagnosis.problem import Candidate, Samples
 from defras_bt.diagnosis.ranking import unseen, whitened_products
-from defras_bt.diagnosis.selection import Search, noise_beside
+from defras_bt.diagnosis.selection import Search, board_of
 from defras_bt.diagnosis.verdict import Excluded
 from defras_sim.geometry import Floats
 
@@ -18,13 +19,16 @@ from defras_sim.geometry import Floats
 def exclusions(search: Search) -> tuple[dict[str, Excluded], tuple[str, ...]]:
     """By candidate key: the strength that would have shown in 95 % of cases, for those within
     whose bounds there is one. Also the candidates that change nothing observable."""
-    noise, now, left = noise_beside(search)
+    now = board_of(search)
     if not now.of_option:
         return {}, ()
-    known = known_noise(now, noise, left, search.samples, search.layout, search.rng)
+    beside = noise_beside(search.fit.residual, now, search.samples, search.layout)
+    known = known_noise(now, beside, search.samples, search.layout, search.rng)
     filled = np.nan_to_num(search.fit.residual)[:, None]
     found = whitened_products(now, known.middle, filled)
-    chance = surrogate_products(now, known, left, search.settings.surrogates, search.rng)
+    chance = surrogate_products(
+        now, known, beside.remainder, search.settings.surrogates, search.rng
+    )
     invisible = unseen(now, found)
     result: dict[str, Excluded] = {}
     for key, placed in now.of_option.items():

@@ -22,6 +22,7 @@ from defras_bt.diagnosis.held_out import Products
 from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise import Noise, estimate_noise
 from defras_bt.diagnosis.noise_bias import KnownNoise
+from defras_bt.diagnosis.noise_search import noise_beside
 from defras_bt.diagnosis.predicted_folds import HeldOut, hold_out
 from defras_bt.diagnosis.problem import Samples
 from defras_bt.diagnosis.ranking import (
@@ -29,11 +30,11 @@ from defras_bt.diagnosis.ranking import (
     board,
     ranked,
     ranked_pairs,
-    remainder,
     score,
     start_of,
     whitened_products,
 )
+from defras_bt.diagnosis.restarts import restart
 from defras_bt.diagnosis.settings import Settings
 from defras_sim.geometry import Floats
 
@@ -41,6 +42,9 @@ _HOPELESS = 0.5
 """Of the threshold: candidates below it on the linearised model are not fitted."""
 _NOT_MUCH_WORSE = 0.3
 """Of the best candidate's statistic: those below it are not fitted either."""
+
+_PASSES = 3
+"""Over all candidates, where causes had to begin anew in between."""
 
 Progress = Callable[[str, float], None]
 
@@ -91,30 +95,18 @@ class Search:
 
 def select(search: Search, told: Progress) -> None:
     """Accept causes until none is left that is better than chance."""
-    while len(search.accepted()) < search.settings.causes:
-        if not _forward(search, told):
+    for _ in range(_PASSES):
+        while len(search.accepted()) < search.settings.causes:
+            if not _forward(search, told):
+                break
+        if not restart(search, told):
             break
     _backward(search, told)
 
 
-def noise_beside(search: Search, key: str | None = None) -> tuple[Noise, Board, Floats]:
-    """Noise that is left when nuisances and the best candidate are taken out of the residual, the
-    board of candidates, and that remainder (n,)."""
-    residual = search.fit.residual
-    filled = np.nan_to_num(residual)
-    now = board(search.sketch, search.fit.jacobian, search.samples.fold, search.open_keys())
-    noise = estimate_noise(residual, search.samples, search.layout)
-    left = residual
-    for _ in range(2):
-        found = whitened_products(now, noise, filled[:, None])
-        scores = score(now, found)
-        best = max(scores.best, key=lambda k: float(scores.statistic(k)[0]), default=None)
-        option = 0 if best is None else int(scores.option[best][0])
-        if best is not None and not now.of_option[best]:
-            best = None
-        left = np.where(noise.seen, remainder(now, found, filled, best, option), np.nan)
-        noise = estimate_noise(left, search.samples, search.layout)
-    return noise, now, left
+def board_of(search: Search) -> Board:
+    """Candidates that are still open, beside the present model."""
+    return board(search.sketch, search.fit.jacobian, search.samples.fold, search.open_keys())
 
 
 def _forward(search: Search, told: Progress) -> bool:
@@ -123,8 +115,9 @@ def _forward(search: Search, told: Progress) -> bool:
         return False
     number = len(search.rounds) + 1
     told(f"round {number}: ranking", 0.0)
-    noise, now, left = noise_beside(search)
-    known = known_noise(now, noise, left, search.samples, search.layout, search.rng)
+    now = board_of(search)
+    beside = noise_beside(search.fit.residual, now, search.samples, search.layout)
+    known = known_noise(now, beside, search.samples, search.layout, search.rng)
     found = whitened_products(now, known.middle, np.nan_to_num(search.fit.residual)[:, None])
     search.noise = known.middle
     rows = ranked(now, search.sketch, found)
@@ -133,7 +126,7 @@ def _forward(search: Search, told: Progress) -> bool:
         best = [row.key for row in rows[:12]]
         search.pairs = ranked_pairs(now, found, best)
     told(f"round {number}: what chance reaches", 0.2)
-    limit = _threshold(search, now, known, left)
+    limit = _threshold(search, now, known, beside.remainder)
     hopeful = _hopeful(search, _worth_naming(search, now, found, rows), limit)
     trials, fits = [], {}
     for index, row in enumerate(hopeful):
