@@ -14,7 +14,7 @@ from defras_bt.cli.errors import ExitCode, UserError
 from defras_sim.rest_shape import NotASlab
 from defras_sim.yaml_source import InvalidFile
 
-COMMANDS = ("run", "plan", "view", "explain", "operator", "replay", "doctor")
+COMMANDS = ("run", "plan", "view", "explain", "operator", "replay", "diagnose", "doctor")
 """Commands, each the function of its name in the module of its name."""
 
 GROUPS = ("scene", "tree", "benchmark")
