@@ -8,12 +8,13 @@ everything together says which of these noises to believe.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
-from defras_bt.diagnosis.held_out import Bounded, losses, products
+from defras_bt.diagnosis.held_out import Bounded, Products, losses, products
 from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise import ChannelNoise, Noise, estimate_noise
 from defras_bt.diagnosis.problem import Integers, Samples
@@ -38,20 +39,40 @@ def noise_beside(residual: Floats, board: Board, samples: Samples, found: Layout
     first = estimate_noise(residual, samples, found)
     tried = [_without(residual, board, samples, found, first, ())]
     best = tried[0]
-    listed: dict[str, int] = {}
+    singles: dict[str, int] = {}
+    pairs: dict[tuple[tuple[str, int], ...], None] = {}
     for weighing in (best.noise, _white(best.noise)):
-        scores = score(board, whitened_products(board, weighing, np.nan_to_num(residual)[:, None]))
+        inner = whitened_products(board, weighing, np.nan_to_num(residual)[:, None])
+        scores = score(board, inner)
         order = sorted(scores.best, key=lambda key: -float(scores.statistic(key)[0]))
-        for key in [k for k in order if board.of_option[k]][:_SHORT_LIST]:
-            listed.setdefault(key, int(scores.option[key][0]))
-    for key, option in listed.items():
-        tried.append(_without(residual, board, samples, found, best.noise, ((key, option),)))
-    by_likelihood = sorted(tried[1:], key=_cost)[:_SHORT_LIST]
-    singles = [one.removed[0] for one in by_likelihood]
-    for pair in combinations(singles, 2):
-        chosen = tuple((key, listed[key]) for key in pair)
+        order = [key for key in order if board.of_option[key]][:_SHORT_LIST]
+        for key in order:
+            singles.setdefault(key, int(scores.option[key][0]))
+        pairs |= dict.fromkeys(_pairs(board, inner, order))
+    for chosen in [*((single,) for single in singles.items()), *pairs]:
         tried.append(_without(residual, board, samples, found, best.noise, chosen))
     return min(tried, key=_cost)
+
+
+def _pairs(board: Board, inner: Products, keys: Sequence[str]) -> list[tuple[tuple[str, int], ...]]:
+    """The few pairs of ``keys`` that leave least, each with the options that do."""
+    found = []
+    for first, second in combinations(keys, 2):
+        null = np.concatenate([board.always, *_nuisances(board, (first, second))])
+        choices = [
+            (
+                float(losses(inner, np.concatenate((null, one, other))).fitted[0]),
+                ((first, i), (second, j)),
+            )
+            for i, (_, one) in enumerate(board.of_option[first])
+            for j, (_, other) in enumerate(board.of_option[second])
+        ]
+        found.append(min(choices))
+    return [chosen for _, chosen in sorted(found)[:_SHORT_LIST]]
+
+
+def _nuisances(board: Board, without: Sequence[str]) -> list[Integers]:
+    return [own for name, own in board.nuisance.items() if name not in without]
 
 
 def _without(
@@ -65,7 +86,7 @@ def _without(
     """Nuisances and ``chosen`` options taken out, by weights that follow from the result."""
     index: list[Integers] = [board.always]
     keys = [key for key, _ in chosen]
-    index += [own for name, own in board.nuisance.items() if name not in keys]
+    index += _nuisances(board, keys)
     bounds: tuple[Bounded, ...] = ()
     for key, option in chosen:
         one, own = board.of_option[key][option]
