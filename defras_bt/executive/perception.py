@@ -78,8 +78,8 @@ class Perception:
             if board.grips and "cloud" not in missing:
                 self._keyframes.add(
                     sensed.time_s,
-                    {name: grip.grasp_tip for name, grip in board.grips.items()},
-                    {name: setpoints[name] for name in board.grips},
+                    self._twin.taken,
+                    self._twin.jaws,
                     cloud,
                 )
         self._count_force(force_n, scene.tick_s)

@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defras_bt.learning.estimate import Keyframe
+from defras_sim.effects.extended_tissue import ExtendedSnapshot, ExtendedTissue
+from defras_sim.effects.layers import Layers
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import Scene
+from defras_sim.surface import Surface
 from defras_sim.tissue.hole_response import HoleResponse
-from defras_sim.tissue.model import NothingToGrasp, TissueModel, TissueSnapshot
+from defras_sim.tissue.model import NothingToGrasp
 from defras_sim.tissue.state import TissueState
 
 
@@ -34,8 +37,16 @@ class Replay:
         elements_xyz: tuple[int, int, int] | None = None,
     ) -> None:
         self._keyframes = tuple(keyframes)
-        self.model = TissueModel(belief, elements_xyz=elements_xyz)
-        self._snapshots: list[TissueSnapshot] = []
+        layers = Layers.of(belief.model.extension)
+        self._tissue = ExtendedTissue(belief, layers.tissue, elements_xyz=elements_xyz)
+        self._rest = self._tissue.snapshot()
+        self._speed_m_s = belief.motion.tissue_speed_m_s
+        self._snapshots: list[ExtendedSnapshot] = []
+
+    @property
+    def rest_surface(self) -> Surface:
+        """The surface where nobody holds the tissue."""
+        return self._tissue.model.rest_surface
 
     def repeat(self, stiffness_n_per_m: Floats) -> list[TissueState]:
         """Repeat the whole motion from rest; later changes start from here.
@@ -43,20 +54,21 @@ class Replay:
         Raises:
             NotRepeatable: a grasp misses the tissue, or a solve fails.
         """
-        model = self.model
-        model.reset()
-        model.set_hole_stiffness(stiffness_n_per_m)
+        tissue = self._tissue
+        tissue.restore(self._rest)
+        tissue.reset()
+        tissue.set_hole_stiffness(stiffness_n_per_m)
         self._grasp_all(self._keyframes[0])
         states, self._snapshots = [], []
         for number, frame in enumerate(self._keyframes, 1):
-            state = model.solve(frame.tips)
+            state = tissue.solve(frame.tips, frame.stamp_s)
             if not state.converged:
                 raise NotRepeatable(
                     f"the model finds no equilibrium on the way to frame {number} "
                     f"of {len(self._keyframes)}"
                 )
             states.append(state)
-            self._snapshots.append(model.snapshot())
+            self._snapshots.append(tissue.snapshot())
         return states
 
     def shapes(
@@ -68,14 +80,14 @@ class Replay:
         """
         states = []
         snapshots = list(self._snapshots)
-        self.model.set_hole_stiffness(stiffness_n_per_m)
+        self._tissue.set_hole_stiffness(stiffness_n_per_m)
         for frame in frames:
-            self.model.restore(self._snapshots[frame])
-            state = self.model.solve(self._keyframes[frame].tips)
+            self._tissue.restore(self._snapshots[frame])
+            state = self._tissue.solve(self._keyframes[frame].tips, self._keyframes[frame].stamp_s)
             if not state.converged:
                 return None
             states.append(state)
-            snapshots[frame] = self.model.snapshot()
+            snapshots[frame] = self._tissue.snapshot()
         if keep:
             self._snapshots = snapshots
         return states
@@ -83,21 +95,21 @@ class Replay:
     def displaced(self, frame: int, shift_m: Mapping[str, Floats]) -> TissueState | None:
         """Shape at ``frame`` if what arms hold were ``shift_m`` (3,) off their tips, with the holes
         as they were last set; None where no equilibrium is found."""
-        self.model.restore(self._snapshots[frame])
+        self._tissue.restore(self._snapshots[frame])
         tips = {
             arm: tip.moved(shift_m[arm]) if arm in shift_m else tip
             for arm, tip in self._keyframes[frame].tips.items()
         }
-        state = self.model.solve(tips)
+        state = self._tissue.solve(tips, self._keyframes[frame].stamp_s)
         return state if state.converged else None
 
     def response(
         self, frame: int, stiffness_n_per_m: Floats, holes: NDArray[np.int64]
     ) -> HoleResponse:
         """How a kept shape, with the holes as they were then, answers to forces at ``holes``."""
-        self.model.set_hole_stiffness(stiffness_n_per_m)
-        self.model.restore(self._snapshots[frame])
-        return self.model.response_to_hole_forces(holes)
+        self._tissue.set_hole_stiffness(stiffness_n_per_m)
+        self._tissue.restore(self._snapshots[frame])
+        return self._tissue.model.response_to_hole_forces(holes)
 
     def _grasp_all(self, first: Keyframe) -> None:
         """Take every grasp; an arm that has moved at the first frame took the tissue earlier."""
@@ -105,15 +117,17 @@ class Replay:
             arm: float(np.linalg.norm(first.tips[arm].position_m - tip.position_m))
             for arm, tip in first.grasp_tips.items()
         }
+        # When the first arm closed nobody noted; moving at its usual speed, it was then.
+        grasped_s = first.stamp_s - max(moved.values()) / self._speed_m_s
         held: dict[str, Pose] = {}
         for arm in sorted(moved, key=lambda name: -moved[name]):
-            self._go(held)
+            self._go(held, grasped_s)
             try:
-                self.model.grasp(arm, first.grasp_tips[arm])
+                self._tissue.grasp(arm, first.grasp_tips[arm])
             except NothingToGrasp as miss:
                 raise NotRepeatable(f"the grasp of {arm} cannot be repeated: {miss}") from miss
             held[arm] = first.tips[arm]
 
-    def _go(self, tips: Mapping[str, Pose]) -> None:
-        if tips and not self.model.solve(tips).converged:
+    def _go(self, tips: Mapping[str, Pose], time_s: float) -> None:
+        if tips and not self._tissue.solve(tips, time_s).converged:
             raise NotRepeatable("the model finds no equilibrium on the way to the second grasp")

@@ -185,7 +185,7 @@ class AttachmentSearch:
             self._misfits = known
             forces = [np.linalg.norm(state.attachment_forces_n, axis=1) for state in states]
             self._force_n = np.max(forces, axis=0)
-            rest = self._replay.model.rest_surface
+            rest = self._replay.rest_surface
             moved = [_moved_m(state.surface, rest, self._belief) for state in states]
             self._stretch_m = np.max(moved, axis=0)
         residuals = [cells.residual_m(each) for cells, each in zip(self._cells, known, strict=True)]

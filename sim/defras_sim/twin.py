@@ -84,6 +84,17 @@ class Twin:
         return tuple(grip.arm for grip in self._grips)
 
     @property
+    def taken(self) -> Mapping[str, Pose]:
+        """tissue_from_jaw by holding arm: where it really took the tissue."""
+        return {grip.arm: grip.jaw for grip in self._grips}
+
+    @property
+    def jaws(self) -> Mapping[str, Pose]:
+        """tissue_from_jaw by holding arm: where what it holds was carried last. Without effects on
+        arms and grasps that is its set-point."""
+        return dict(self._jaws)
+
+    @property
     def force_n(self) -> float:
         """Largest force of a grasp on the tissue; 0 without a grasp, NaN while stale."""
         if not self._state.converged:

@@ -40,6 +40,8 @@ class BenchTwin:
         self.feels_n = 0.0
         self.broken: Exception | None = None
         self.holding: set[str] = set()
+        self.taken: dict[str, Pose] = {}
+        self.jaws: dict[str, Pose] = {}
         self.registered: list[Pose] = []
 
     @property
@@ -48,13 +50,16 @@ class BenchTwin:
 
     def grasp(self, arm: str, tissue_from_tip: Pose, time_s: float) -> None:
         self.holding.add(arm)
+        self.taken[arm] = self.jaws[arm] = tissue_from_tip
 
     def release(self, arm: str, time_s: float) -> None:
         self.holding.remove(arm)
+        del self.taken[arm], self.jaws[arm]
 
     def track(self, setpoints: Mapping[str, Pose], time_s: float) -> TissueState:
         if self.broken is not None:
             raise self.broken
+        self.jaws = {arm: setpoints[arm] for arm in self.taken}
         return flat_state()
 
     def corrected(self, cloud: PointCloud) -> PointCloud:
