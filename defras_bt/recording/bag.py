@@ -14,8 +14,9 @@ from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
 from defras_sim.geometry import Floats, Pose
 from defras_sim.worlds.protocol import ArmObservation, PointCloud
 
-# A killed process loses at most the messages of so many ticks; see mcap_file for the rest.
-_FLUSH_EVERY = 20
+# A killed process loses at most the messages of so many ticks; see mcap_file for the rest. Often,
+# so that no tick has much to write.
+_FLUSH_EVERY = 4
 
 
 class BagRecorder:

@@ -93,22 +93,33 @@ class Field:
         self._stream.log(f"world/tissue/{name}", mesh)
 
     def _log_arm(self, name: ArmName, rcm_m: Vector, arm: ArmObservation) -> None:
-        pose = arm.tissue_from_tip
-        if not self._changes.new(name, (pose.position_m.tobytes(), arm.grasped, arm.jaw_rad)):
+        tip_m = arm.tissue_from_tip.position_m
+        shape = (arm.grasped, arm.jaw_rad)
+        if not self._changes.new(name, (tip_m.tobytes(), *shape)):
             return
-        tip_m, colour = pose.position_m, palette.ARMS[name]
-        shaft = np.array([tip_m, _up_the_shaft(tip_m, rcm_m)])
+        if self._changes.new(f"{name}/shape", shape):
+            self._log_shape(name, arm)
+        shaft_m = np.array([tip_m, _up_the_shaft(tip_m, rcm_m)], np.float32)
+        self._stream.log(f"world/{name}/shaft", rr.LineStrips3D.from_fields(strips=[shaft_m]))
+        self._stream.log(f"world/{name}/tip", rr.Points3D.from_fields(positions=shaft_m[:1]))
+        on_map = np.array([tip_m[:2] * (1000, -1000)], np.float32)
+        self._stream.log(f"map/{name}", rr.Points2D.from_fields(positions=on_map))
+
+    def _log_shape(self, name: ArmName, arm: ArmObservation) -> None:
+        """What seldom changes of how an arm looks."""
+        colour, grasped = palette.ARMS[name], bool(arm.grasped)
         self._stream.log(
-            f"world/{name}/shaft", rr.LineStrips3D([shaft], colors=colour, radii=0.0025)
+            f"world/{name}/shaft", rr.LineStrips3D.from_fields(colors=colour, radii=0.0025)
         )
-        size_m = 0.0036 if arm.grasped else 0.0026
-        self._stream.log(f"world/{name}/tip", rr.Points3D([tip_m], colors=colour, radii=size_m))
+        self._stream.log(
+            f"world/{name}/tip",
+            rr.Points3D.from_fields(colors=colour, radii=0.0036 if grasped else 0.0026),
+        )
         self._stream.log(
             f"map/{name}",
-            rr.Points2D(
-                [tip_m[:2] * (1000, -1000)],
+            rr.Points2D.from_fields(
                 colors=colour,
-                radii=3.6 if arm.grasped else 2.2,
+                radii=3.6 if grasped else 2.2,
                 labels=[name.upper()],
                 draw_order=40.0,
             ),
