@@ -99,7 +99,7 @@ def diagnose(
                     raise UserError(
                         f"--twin {twin.value} takes tables; --scene and --topics are for recordings"
                     )
-                material = table_material(asked, twin.value)
+                material = table_material(asked, "arm" if twin is TwinKind.arm else "coupon")
         except UnusableRecording as error:
             raise UserError(str(error)) from error
         folder_for(out)
