@@ -120,6 +120,27 @@ class Problem(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Covariate:
+    """Something that residuals may depend on: ``values`` (n,) for each of the samples, NaN where
+    it does not concern one. ``followed``: the sensor should read this, so that a residual along
+    its rate is a lag."""
+
+    name: str
+    unit: str
+    values: Floats
+    followed: bool = False
+
+
+@runtime_checkable
+class Covarying(Protocol):
+    """A problem that knows what its residuals may depend on."""
+
+    def covariates(self) -> Sequence[Covariate]:
+        """For the portrait of the residual: set-points, insertion, height of the tip, ..."""
+        ...
+
+
 @runtime_checkable
 class Remarking(Protocol):
     """A problem that knows what its data say beside any effect."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from defras_bt.diagnosis.diagnosis import Diagnosis
+from defras_bt.diagnosis.diagnosis import Diagnosis, Statistic
 from defras_bt.diagnosis.excess import excess_by_sensor, removed_share
 from defras_bt.diagnosis.findings import Findings
 from defras_bt.diagnosis.portrait import portrait
+from defras_bt.diagnosis.problem import Covarying
 from defras_bt.diagnosis.verdict import Cause, Estimate, Gain, Verdict, VerdictName
 from defras_sim.geometry import Floats
 
@@ -39,8 +40,8 @@ def diagnosis_of(found: Findings) -> Diagnosis:
         held_out_after=after,
         fold_gain=np.array([np.nan if gain is None else gain for gain in folds]),
         excess=excess_by_sensor(before, after, samples),
-        portrait=portrait(found.base.residual, samples),
-        portrait_after=portrait(search.fit.residual, samples),
+        portrait=_portrait(found, found.base.residual),
+        portrait_after=_portrait(found, search.fit.residual),
         ranking=search.ranking,
         pairs=search.pairs,
         rounds=tuple(search.rounds),
@@ -49,6 +50,22 @@ def diagnosis_of(found: Findings) -> Diagnosis:
         unseen=found.unseen,
         residual_calls=search.counted.calls,
         complete=found.complete,
+    )
+
+
+def _portrait(found: Findings, residual: Floats) -> tuple[Statistic, ...]:
+    """A residual beside noise as the best model leaves it: what that model explains stands out."""
+    search = found.search
+    problem = search.counted.problem
+    covariates = problem.covariates() if isinstance(problem, Covarying) else ()
+    return portrait(
+        residual,
+        search.samples,
+        search.layout,
+        search.noise,
+        search.fit.residual,
+        covariates,
+        search.rng,
     )
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defras_bt.diagnosis.problem import Candidate, Channel, Samples
+from defras_bt.diagnosis.problem import Candidate, Channel, Covariate, Samples
 from defras_bt.diagnosis.quality import DataFault, DataQuality
 from defras_bt.diagnosis.tables import Table
 from defras_bt.diagnosis.tables_quality import (
@@ -81,6 +81,10 @@ class ArmProblem(TableProblem):
                 + (f" ({found})" if found else "")
             )
         return ArmProblem(runs, quality(tables, faults))
+
+    def covariates(self) -> Sequence[Covariate]:
+        """Each joint's own set-point, which it should follow."""
+        return (Covariate("its set-point", "", self._compared(self._setpoints), followed=True),)
 
     @property
     def _setpoints(self) -> list[Floats]:
