@@ -1,7 +1,7 @@
 """Points sorted into cubes, so that those near a place are found without looking at all.
 
-A search goes from the cube a place lies in to the cubes around it, ring by ring; ``ring_m`` says
-how near a point of the next ring can be at best, which proves when the search may stop.
+A search starts with what is in the cube nearest to a place, and then looks into every other cube
+that is nearer than the best so far.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from defras_sim.geometry import Floats
 from defras_sim.tissue.matrices import jit
 
 _MAX_CELLS_PER_POINT = 8
+ROUNDING = 1e-9
 
 
 class Cells(NamedTuple):
@@ -90,35 +91,6 @@ def sorted_into_cells(points_m: Floats, side_m: float) -> Cells:
 
 
 @jit
-def ring_ranges(
-    cells: Cells, cube: tuple[int, int, int], ring: int, ranges: NDArray[np.int64]
-) -> int:
-    """Write ranges (first, end) of ``cells.points_m`` in the ring around ``cube``; return how many.
-
-    Ring 0 is the cube, ring r the cubes r away along one axis and no farther along the others.
-    ``ranges`` is a buffer from :func:`range_buffer`. Cubes that follow each other in z hold points
-    that follow each other: each column of cubes gives one range, or two where the ring is hollow.
-    """
-    count = 0
-    low, high = cube[2] - ring, cube[2] + ring
-    for x in range(max(cube[0] - ring, 0), min(cube[0] + ring + 1, cells.shape[0])):
-        for y in range(max(cube[1] - ring, 0), min(cube[1] + ring + 1, cells.shape[1])):
-            column = (x * cells.shape[1] + y) * cells.shape[2]
-            if max(abs(x - cube[0]), abs(y - cube[1])) == ring:
-                top = column + min(high, cells.shape[2] - 1)
-                ranges[count, 0] = cells.first[column + max(low, 0)]
-                ranges[count, 1] = cells.first[top + 1]
-                count += 1
-                continue
-            for z in (low, high):
-                if 0 <= z < cells.shape[2]:
-                    ranges[count, 0] = cells.first[column + z]
-                    ranges[count, 1] = cells.first[column + z + 1]
-                    count += 1
-    return count
-
-
-@jit
 def neighbour_ranges(cells: Cells, cube: int, ranges: NDArray[np.int64]) -> int:
     """Write ranges of the points in cube number ``cube`` and those around it; return how many.
 
@@ -139,46 +111,24 @@ def neighbour_ranges(cells: Cells, cube: int, ranges: NDArray[np.int64]) -> int:
 
 
 @jit
-def range_buffer(cells: Cells) -> NDArray[np.int64]:
-    """Room for what :func:`ring_ranges` writes."""
-    return np.empty((2 * cells.shape[0] * cells.shape[1], 2), np.int64)
+def cube_at(along: float, count: int) -> int:
+    """Number of the cube, of ``count`` along an axis, that is nearest to a place.
 
-
-@jit
-def home(cells: Cells, at: Floats) -> tuple[tuple[int, int, int], float, float]:
-    """The cube nearest to a place (3,), and what :func:`ring_m` asks for.
-
-    These are the least distance of the box's nearest place to a neighbouring cube, and the square
-    of the distance to the box of all cubes, 0 for a place in it.
+    Places along an axis are told in sides of cubes from the first one's lower end.
     """
-    x, in_x, out_x = _along(cells, at[0], 0)
-    y, in_y, out_y = _along(cells, at[1], 1)
-    z, in_z, out_z = _along(cells, at[2], 2)
-    return (x, y, z), min(in_x, in_y, in_z), out_x**2 + out_y**2 + out_z**2
+    return min(max(int(along), 0), count - 1)
 
 
 @jit
-def _along(cells: Cells, at_m: float, axis: int) -> tuple[int, float, float]:
-    along = at_m - cells.low_m[axis]
-    nearest = min(max(along, 0.0), cells.shape[axis] * cells.side_m)
-    cube = min(int(nearest / cells.side_m), cells.shape[axis] - 1)
-    # Beyond the outermost cubes there is nothing that could be near.
-    below = nearest - cube * cells.side_m if cube > 0 else np.inf
-    above = (cube + 1) * cells.side_m - nearest if cube < cells.shape[axis] - 1 else np.inf
-    return cube, max(min(below, above), 0.0), along - nearest
+def inside(along: float, cube: int) -> float:
+    """How far inside a cube a place is, along one axis; negative: how far beside it."""
+    return min(along - cube, cube + 1.0 - along)
 
 
 @jit
-def ring_m(cells: Cells, ring: int, inside_m: float, outside_square: float) -> float:
-    """No point in ring ``ring`` >= 1 or beyond is nearer to a place than this; see :func:`home`.
+def reach(square_m2: float, per_m: float) -> float:
+    """Only what is nearer than this, in sides of cubes, can be nearer than ``square_m2`` says.
 
-    The box of all cubes is convex, so the way from its nearest point onwards to any point in it
-    makes no acute angle with the way there: squares of both add up to no more than the distance's.
+    A little generous, so that rounding leaves nothing out. ``per_m``: one over the side.
     """
-    return np.sqrt(((ring - 1) * cells.side_m + inside_m) ** 2 + outside_square)
-
-
-@jit
-def last_ring(cells: Cells) -> int:
-    """No cube is in a ring beyond this."""
-    return max(cells.shape[0], cells.shape[1], cells.shape[2])
+    return np.sqrt(square_m2) * per_m * (1.0 + ROUNDING) + ROUNDING

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from defras_bt.monitoring.cells import ROUNDING, cube_at, inside, reach
 from defras_bt.monitoring.triangle_cells import triangle_cells
 from defras_bt.monitoring.triangles import Point, bound, planes_of, square_to, weights_of
 from defras_sim.geometry import Floats
 from defras_sim.tissue.matrices import jit
-
-# Bounds are compared a little generously, so that rounding leaves no triangle out.
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -75,29 +73,29 @@ def _search(points: Floats, corners: Floats) -> tuple[Floats, NDArray[np.int64]]
             square = square_to(p, corners, nearest)
         # In sides of cubes from here on.
         x, y, z = (p[0] - low[0]) * per_m, (p[1] - low[1]) * per_m, (p[2] - low[2]) * per_m
-        own_x, own_y, own_z = _cube(x, nx), _cube(y, ny), _cube(z, nz)
+        own_x, own_y, own_z = cube_at(x, nx), cube_at(y, ny), cube_at(z, nz)
         own = (own_x * ny + own_y) * nz + own_z
         start, end = first[own], first[own + 1]
         square, nearest = _nearer(p, corners, planes, listed, start, end, bounds, square, nearest)
-        reach = _reach(square, per_m)
-        if reach < min(_inside(x, own_x), _inside(y, own_y), _inside(z, own_z)):
+        most = reach(square, per_m)
+        if most < min(inside(x, own_x), inside(y, own_y), inside(z, own_z)):
             distance[i], index[i] = np.sqrt(square), nearest
             continue
-        for column_x in range(_cube(x - reach, nx), _cube(x + reach, nx) + 1):
-            beside_x = max(-_inside(x, column_x), 0.0) ** 2
-            half = np.sqrt(max(reach**2 - beside_x, 0.0))
-            for column_y in range(_cube(y - half, ny), _cube(y + half, ny) + 1):
-                left = reach**2 - beside_x - max(-_inside(y, column_y), 0.0) ** 2
+        for column_x in range(cube_at(x - most, nx), cube_at(x + most, nx) + 1):
+            beside_x = max(-inside(x, column_x), 0.0) ** 2
+            half = np.sqrt(max(most**2 - beside_x, 0.0))
+            for column_y in range(cube_at(y - half, ny), cube_at(y + half, ny) + 1):
+                left = most**2 - beside_x - max(-inside(y, column_y), 0.0) ** 2
                 if left < 0.0:
                     continue
                 column, half = (column_x * ny + column_y) * nz, np.sqrt(left)
-                start = first[column + _cube(z - half, nz)]
-                end = first[column + _cube(z + half, nz) + 1]
+                start = first[column + cube_at(z - half, nz)]
+                end = first[column + cube_at(z + half, nz) + 1]
                 if start < end:
                     square, nearest = _nearer(
                         p, corners, planes, listed, start, end, bounds, square, nearest
                     )
-                    reach = _reach(square, per_m)
+                    most = reach(square, per_m)
         distance[i], index[i] = np.sqrt(square), nearest
     return distance, index
 
@@ -126,30 +124,12 @@ def _nearer(
         if known and (least < square or (least == square and t < nearest)):
             square, nearest = least, t
     for at in range(start, end):
-        if bounds[at - start] <= square * (1.0 + _ROUNDING) and listed[at] != nearest:
+        if bounds[at - start] <= square * (1.0 + ROUNDING) and listed[at] != nearest:
             t = listed[at]
             other = square_to(p, corners, t)
             if other < square or (other == square and t < nearest):
                 square, nearest = other, t
     return square, nearest
-
-
-@jit
-def _reach(square: float, per_m: float) -> float:
-    """Only what is nearer than this, in sides of cubes, could be closest."""
-    return np.sqrt(square) * per_m * (1.0 + _ROUNDING) + _ROUNDING
-
-
-@jit
-def _cube(along: float, count: int) -> int:
-    """Number of the cube, of ``count`` along an axis, that is nearest to a place."""
-    return min(max(int(along), 0), count - 1)
-
-
-@jit
-def _inside(along: float, cube: int) -> float:
-    """How far inside a cube a place is, along one axis; negative: how far beside it."""
-    return min(along - cube, cube + 1.0 - along)
 
 
 @jit

@@ -42,11 +42,14 @@ def picture_tiles(
     size_px: Floats,
     side: float,
 ) -> PictureTiles:
-    """List ``triangles`` (m, 3), m > 0, of vertices (n, 3) in camera coordinates.
+    """List ``triangles`` (m, 3) of vertices (n, 3) in camera coordinates.
 
     ``intrinsics`` (3, 3) lead to pixels, the picture is ``size_px`` (2,) of them. ``side`` is that
     of a tile, to the side of a mean triangle's picture.
     """
+    if len(triangles) == 0:
+        nothing = TileGrid(0.0, 0.0, 1.0, 1, 1)
+        return PictureTiles(np.zeros(2, np.int64), np.empty(0, np.int64), nothing)
     boxes = _boxes_px(in_camera_m, triangles, intrinsics, size_px)
     left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
     for t in range(len(boxes)):

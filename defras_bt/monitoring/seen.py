@@ -14,9 +14,9 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from defras_bt.monitoring.hidden import facing_triangles, seen_places, touched_vertices
+from defras_bt.monitoring.hidden import Optics, Sight, look, seen_places, touched_vertices
 from defras_sim.camera.pinhole import intrinsics, tissue_from_camera
-from defras_sim.geometry import Floats, Pose
+from defras_sim.geometry import Floats
 from defras_sim.scene import Camera
 from defras_sim.surface import Surface
 from defras_sim.tissue.matrices import jit
@@ -47,39 +47,34 @@ class SeenSurface:
 
 def seen_surface(surface: Surface, camera: Camera) -> SeenSurface:
     """What ``camera`` sees of ``surface``; everything is empty where it sees nothing."""
-    pose, intrinsic, size_px = _optics(camera)
+    optics = _optics(camera)
     vertices = np.ascontiguousarray(surface.vertices_m)
-    triangles = np.ascontiguousarray(surface.triangles)
-    in_camera = (vertices - pose.position_m) @ pose.rotation
-    facing = facing_triangles(in_camera, triangles)
-    looked_at = in_camera, triangles[facing], _PLACES, intrinsic, size_px
-
-    def sample() -> Floats:
-        return _placed(vertices, triangles[facing], seen_places(*looked_at), _PLACES)
-
-    chosen, corners = _chosen(vertices, triangles, facing, touched_vertices(*looked_at))
-    return SeenSurface(chosen, corners, sample)
+    sight = look(vertices, np.ascontiguousarray(surface.triangles), optics)
+    chosen, corners = _chosen(vertices, sight, touched_vertices(sight, _PLACES, optics))
+    return SeenSurface(
+        chosen,
+        corners,
+        lambda: _placed(vertices, sight.triangles, seen_places(sight, _PLACES, optics), _PLACES),
+    )
 
 
 @lru_cache(maxsize=8)
-def _optics(camera: Camera) -> tuple[Pose, Floats, Floats]:
-    """tissue_from_camera, intrinsics (3, 3) and size in pixels (2,)."""
-    size_px = np.array([camera.width_px, camera.height_px], float)
-    return tissue_from_camera(camera), intrinsics(camera), size_px
+def _optics(camera: Camera) -> Optics:
+    pose, size_px = tissue_from_camera(camera), [camera.width_px, camera.height_px]
+    eye_m, turn = pose.position_m, np.ascontiguousarray(pose.rotation)
+    return Optics(eye_m, turn, intrinsics(camera), np.array(size_px, float))
 
 
 @jit
 def _chosen(
-    vertices_m: Floats,
-    triangles: NDArray[np.int64],
-    facing: NDArray[np.int64],
-    touched: NDArray[np.bool_],
+    vertices_m: Floats, sight: Sight, touched: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], Floats]:
-    """Triangles ``facing`` (m,) with a vertex that is ``touched`` (n,), and their corners."""
+    """Triangles that face the eye and have a ``touched`` (n,) vertex, and their corners."""
+    facing, triangles = sight.facing, sight.triangles
     chosen, corners, found = np.empty_like(facing), np.empty((len(facing), 3, 3)), 0
-    for t in facing:
+    for t in range(len(facing)):
         if touched[triangles[t, 0]] or touched[triangles[t, 1]] or touched[triangles[t, 2]]:
-            chosen[found] = t
+            chosen[found] = facing[t]
             for k in range(3):
                 for j in range(3):
                     corners[found, k, j] = vertices_m[triangles[t, k], j]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from defras_bt.monitoring.hidden import facing_triangles, seen_places, touched_vertices
+from defras_bt.monitoring.hidden import Optics, look, seen_places, touched_vertices
 from defras_bt.monitoring.seen import SeenSurface, seen_surface
 from defras_sim.camera.pinhole import in_picture, intrinsics, tissue_from_camera
 from defras_sim.geometry import Floats
@@ -84,14 +84,14 @@ def test_vertices_are_touched_where_any_place_beside_them_is_seen(
     deform: Deform, slab: Callable[..., Surface], scene: Scene
 ) -> None:
     surface, camera = slab(deform), scene.depth_camera
-    pose, size_px = tissue_from_camera(camera), np.array([camera.width_px, camera.height_px], float)
-    in_camera = (surface.vertices_m - pose.position_m) @ pose.rotation
-    triangles = surface.triangles[facing_triangles(in_camera, surface.triangles)]
-    looked_at = in_camera, triangles, PLACES, intrinsics(camera), size_px
-    expected = np.zeros(len(in_camera), bool)
-    expected[triangles[seen_places(*looked_at).any(axis=1)]] = True
-    assert 0 < np.count_nonzero(expected) < len(in_camera)
-    np.testing.assert_array_equal(touched_vertices(*looked_at), expected)
+    pose, size_px = tissue_from_camera(camera), [camera.width_px, camera.height_px]
+    turn = np.ascontiguousarray(pose.rotation)
+    optics = Optics(pose.position_m, turn, intrinsics(camera), np.array(size_px, float))
+    sight = look(surface.vertices_m, surface.triangles, optics)
+    expected = np.zeros(len(surface.vertices_m), bool)
+    expected[sight.triangles[seen_places(sight, PLACES, optics).any(axis=1)]] = True
+    assert 0 < np.count_nonzero(expected) < len(expected)
+    np.testing.assert_array_equal(touched_vertices(sight, PLACES, optics), expected)
 
 
 def test_the_lower_face_of_a_resting_slab_is_never_seen(
