@@ -12,6 +12,7 @@ from rich.console import Console
 
 from defras_bt.cli.errors import ExitCode, UserError
 from defras_sim.rest_shape import NotASlab
+from defras_sim.worlds.error import CannotImitate
 from defras_sim.yaml_source import InvalidFile
 
 COMMANDS = ("run", "plan", "view", "explain", "operator", "replay", "diagnose", "doctor")
@@ -60,7 +61,7 @@ def run_commands() -> None:
         for fault in error.faults:
             console.print(str(fault), style="red", markup=False)
         sys.exit(ExitCode.INVALID)
-    except (UserError, NotASlab) as error:
+    except (UserError, NotASlab, CannotImitate) as error:
         console.print(str(error), style="red", markup=False)
         sys.exit(ExitCode.INVALID)
     except Exception as error:

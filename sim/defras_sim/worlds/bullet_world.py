@@ -58,7 +58,7 @@ class BulletWorld:
         """``scene`` is the actual one. ``rng`` makes the sensors' noise.
 
         Raises:
-            ValueError: the scene adopts an effect that PyBullet cannot imitate.
+            CannotImitate: the scene adopts an effect that PyBullet's tissue cannot have.
         """
         layers = Layers.of(scene.model.extension)
         scene = in_bullet(scene, layers)

@@ -13,6 +13,7 @@ from defras_sim.geometry import Floats
 from defras_sim.scene import Attachments, Roi, Scene
 from defras_sim.worlds.bullet_effects import in_bullet
 from defras_sim.worlds.bullet_world import BulletWorld
+from defras_sim.worlds.error import CannotImitate
 from defras_sim.worlds.protocol import (
     JAW_CLOSED_RAD,
     JAW_OPEN_RAD,
@@ -117,7 +118,7 @@ def test_a_wrong_registration_slip_and_camera_show_where_they_should(scene: Scen
 def test_another_slab_is_imitated_and_anything_more_is_refused_by_name(scene: Scene) -> None:
     stiffer = Layers.of({"stiffness": {"scale": 2.0}})
     assert in_bullet(scene, stiffer).tissue.young_modulus_pa == pytest.approx(6000.0)
-    with pytest.raises(ValueError, match=r"the effect stress_relaxation .*\(--world model\)"):
+    with pytest.raises(CannotImitate, match=r"the effect stress_relaxation .*\(--world model\)"):
         BulletWorld(
             scene.extended({"stress_relaxation": {"fraction": 0.3}}), np.random.default_rng(0)
         )
