@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -122,6 +123,7 @@ class ExtendedTissue:
         if not np.array_equal(held, self.model.hole_stiffness_n_per_m):
             self.model.set_hole_stiffness(held)
         self.model.lift_attachments(height_m)
+        self.model.scale_dents(math.prod(each.dent_factor() for each in self._evolutions.values()))
 
     def _raised(self, term: Term, height_m: float) -> Term:
         """``term`` on a bed so much higher; the same object as long as nothing changes."""

@@ -19,13 +19,17 @@ from defras_sim.geometry import Floats
 from defras_sim.tissue.fading import Fading, Step
 from defras_sim.tissue.matrices import jit
 from defras_sim.tissue.model import TissueModel
-from defras_sim.tissue.parameters import TermParameter
+from defras_sim.tissue.parameters import DentStiffness, TermParameter
 from defras_sim.tissue.prestress import second_piola_pa
 from defras_sim.tissue.softened import Part, density_and_stress
 from defras_sim.tissue.state import TissueState
 
 # Where nothing fades yet, fading is looked for with these times beside the one given.
 TIMES_S = (0.5, 2.0, 8.0)
+# Differences of the dents' stiffness that call for another solve.
+DENTS_NOTICED = 0.02
+# Of the modulus: stresses below this say nothing about what has faded.
+STRESSED = 1e-4
 # Of the stiffness: while a hold changes stresses by less (rms), a solve is not worth it.
 NOTICED = 1e-4
 
@@ -84,17 +88,22 @@ class _Past:
 
 class _Fades(Evolution):
     """Before its first solve the tissue has lain for ever: of the stress that its weight makes,
-    nothing is left to fade."""
+    nothing is left to fade.
+
+    What happens in the dents of holes and jaws is not among the terms; they fade as the tissue does
+    on average, or a coarse mesh, which has deeper dents, would hold more of its force.
+    """
 
     memory: _Past | None = None
 
     def __init__(self, fraction: float, tau_s: float, model: TissueModel) -> None:
         self._fraction = fraction
-        self._noticed_pa = NOTICED * model.scene.tissue.young_modulus_pa
+        self._young_pa = model.scene.tissue.young_modulus_pa
         others = () if fraction > 0 else tuple(t for t in TIMES_S if t != tau_s)
         self._taus_s = (tau_s, *others)
         self._elastic: tuple[Part, ...] = ()
         self._steps = tuple(Step(0.0) for _ in self._taus_s)
+        self._faded = tuple(0.0 for _ in self._taus_s)
 
     def before(self, time_s: float) -> bool:
         past = self.memory
@@ -107,11 +116,12 @@ class _Fades(Evolution):
         self._steps = tuple(Step((time_s - past.time_s) / tau) for tau in self._taus_s)
         faded = self._fraction * (1 - self._steps[0].left)
         rms_pa = np.sqrt(np.mean(past.fading_pa[0] ** 2))
-        return bool(faded * rms_pa > self._noticed_pa)
+        return bool(faded * rms_pa > NOTICED * self._young_pa)
 
     def terms(self, terms: Terms) -> Terms:
         elastic = material_parts(terms)
         self._elastic = elastic
+        self._faded = tuple(self._faded_at(number) for number in range(len(self._taus_s)))
         ahead = self._ahead()
         term = Fading.of(elastic[0].points, elastic, self._fraction, ahead)
         if self._fraction == 0.0:
@@ -133,16 +143,37 @@ class _Fades(Evolution):
                 for step, before in zip(self._steps, past.fading_pa, strict=True)
             )
         self.memory = _Past(time_s, stress, fading)
-        return False
+        self._steps = tuple(Step(0.0) for _ in self._taus_s)
+        return self._fraction * abs(self._faded_at(0) - self._faded[0]) > DENTS_NOTICED
+
+    def dent_factor(self) -> float:
+        """Dents fade as the rest of the tissue does, on average."""
+        return 1 + self._fraction * self._faded[0]
+
+    def _faded_at(self, number: int) -> float:
+        """By how much (-1 to 0) stress has faded by now at one of the time constants, if all of it
+        does: (e H - S):S by S:S, summed over the tissue."""
+        past = self.memory
+        if past is None:
+            return -1.0
+        volumes = self._elastic[0].points.volumes_m3[:, :, None, None]
+        weighted = volumes * past.stress_pa
+        faded = self._steps[number].left * past.fading_pa[number] - past.stress_pa
+        least = np.sum(volumes) * (STRESSED * self._young_pa) ** 2
+        share = np.vdot(weighted, faded) / (np.vdot(weighted, past.stress_pa) + least)
+        return float(np.clip(share, -1.0, 0.0))
 
     def directions(self) -> tuple[Direction, ...]:
         return tuple(
             Direction(
                 "fraction",
                 {"time_s": tau},
-                {TermParameter("stress_relaxation", f"fraction_{number}"): 1.0},
+                {
+                    TermParameter("stress_relaxation", f"fraction_{number}"): 1.0,
+                    DentStiffness(): faded / self.dent_factor(),
+                },
             )
-            for number, tau in enumerate(self._taus_s)
+            for number, (tau, faded) in enumerate(zip(self._taus_s, self._faded, strict=True))
         )
 
     def _ahead(self) -> list[tuple[Floats, float]]:

@@ -74,6 +74,11 @@ class Evolution:
         """How much higher than modelled the bed and what holds the tissue to it are by now."""
         return 0.0
 
+    def dent_factor(self) -> float:
+        """By how many times the dents at holes and jaws are stiffer by now than modelled: what is
+        too small for the mesh, and so not among the terms."""
+        return 1.0
+
     def after(self, time_s: float, state: TissueState) -> bool:
         """Learn from the equilibrium ``state`` at ``time_s``; whether it does not last: something
         tore, so that the solve is due again. Stale states are not learnt from."""

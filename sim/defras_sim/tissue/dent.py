@@ -40,6 +40,10 @@ class Dent:
         give[which], hardening[which] = others.give_m_per_n, others.hardening_n
         return Dent(give, hardening)
 
+    def scaled(self, factor: float) -> Dent:
+        """The same in tissue that is ``factor`` times as stiff."""
+        return Dent(self.give_m_per_n / factor, self.hardening_n * factor)
+
     def pull_n(self, stiffness_n_per_m: Floats, stretch_m: Floats) -> Floats:
         """Pull F (r,) at a stretch: the positive root of F^2 / h + b F - k s = 0."""
         free = stiffness_n_per_m * stretch_m  # the pull if the tissue did not give way

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from defras_sim.geometry import Floats, Pose
 from defras_sim.tissue import grasp as grips
 from defras_sim.tissue import holes as attachments
@@ -12,7 +14,7 @@ from defras_sim.tissue.equilibrium import PotentialEnergy
 from defras_sim.tissue.grasp import Grasp
 from defras_sim.tissue.holes import Holes
 from defras_sim.tissue.rest import is_loaded
-from defras_sim.tissue.springs import SpringTerm
+from defras_sim.tissue.springs import Springs, SpringTerm
 from defras_sim.tissue.terms import Term
 from defras_sim.tissue.travel import Tips
 
@@ -30,6 +32,9 @@ class HeldTissue:
         self._own = {term.name: term for term in own}
         self._holes = holes
         self._grasps: dict[str, Grasp] = {}
+        self._dent_factor = 1.0
+        self._stiffer: dict[str, tuple[Springs, float, Springs]] = {}
+        """By term: springs, by how much their dents are stiffer, and what that gave."""
         self._energy = self._laid_out()
 
     @property
@@ -40,7 +45,7 @@ class HeldTissue:
     @property
     def attachments(self) -> SpringTerm:
         """The term by which the holes hold."""
-        return self._holes.term
+        return self._dented(self._holes.term)
 
     @property
     def grasps(self) -> Mapping[str, Grasp]:
@@ -78,7 +83,22 @@ class HeldTissue:
         if height_m == self._holes.height_m:
             return False
         self._holes.height_m = height_m
-        self._energy = self._energy.with_term(self._holes.term)
+        self._energy = self._energy.with_term(self.attachments)
+        return True
+
+    def scale_dents(self, factor: float) -> bool:
+        """Let the dents of holes and jaws be those of tissue ``factor`` times as stiff; whether
+        that is news.
+
+        Raises:
+            ValueError: not above zero, or not finite.
+        """
+        if factor == self._dent_factor:
+            return False
+        if not (np.isfinite(factor) and factor > 0):
+            raise ValueError(f"dents can be scaled by a number above 0, not by {factor}")
+        self._dent_factor = factor
+        self._energy = self.energy_at(self.tips).with_term(self.attachments)
         return True
 
     def set_term(self, term: Term) -> bool:
@@ -129,12 +149,12 @@ class HeldTissue:
         """The energy with each holding arm's tip at its pose in ``tips``."""
         energy = self._energy
         for arm, grasp in self._grasps_at(tips).items():
-            energy = energy.with_term(grasp.term(arm))
+            energy = energy.with_term(self._dented(grasp.term(arm)))
         return energy
 
     def energy_let_go(self) -> PotentialEnergy:
         """The energy if no arm held."""
-        return PotentialEnergy(self._nodes, [*self._own.values(), self._holes.term])
+        return PotentialEnergy(self._nodes, [*self._own.values(), self.attachments])
 
     def _grasps_at(self, tips: Tips) -> dict[str, Grasp]:
         return {
@@ -142,5 +162,15 @@ class HeldTissue:
         }
 
     def _laid_out(self) -> PotentialEnergy:
-        held = [grasp.term(arm) for arm, grasp in self._grasps.items()]
-        return PotentialEnergy(self._nodes, [*self._own.values(), self._holes.term, *held])
+        held = [self._dented(grasp.term(arm)) for arm, grasp in self._grasps.items()]
+        return PotentialEnergy(self._nodes, [*self._own.values(), self.attachments, *held])
+
+    def _dented(self, term: SpringTerm) -> SpringTerm:
+        """``term`` with its dents as stiff as they are by now."""
+        if self._dent_factor == 1.0:
+            return term
+        springs, factor, stiffer = self._stiffer.get(term.name, (None, 0.0, None))
+        if stiffer is None or springs is not term.springs or factor != self._dent_factor:
+            stiffer = term.springs.in_stiffer_tissue(self._dent_factor)
+            self._stiffer[term.name] = term.springs, self._dent_factor, stiffer
+        return replace(term, springs=stiffer)

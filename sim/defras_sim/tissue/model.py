@@ -139,6 +139,16 @@ class TissueModel:
         if self._held.lift_attachments(height_m):
             self._rest_is_known = False
 
+    def scale_dents(self, factor: float) -> None:
+        """Let the dents of holes and jaws be those of tissue ``factor`` times as stiff; then solve
+        again.
+
+        Raises:
+            ValueError: not above zero, or not finite.
+        """
+        if self._held.scale_dents(factor):
+            self._rest_is_known = False
+
     @property
     def rest_m(self) -> Floats:
         """Nodes (nodes, 3) where nobody holds the tissue: the mesh's own unless loads act.

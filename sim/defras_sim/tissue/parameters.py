@@ -66,9 +66,15 @@ class GraspShift:
     along: tuple[float, float, float]
 
 
-Parameter = (
+@dataclass(frozen=True)
+class DentStiffness:
+    """By how many times the dents at holes and jaws are stiffer than they are."""
+
+
+_Single = (
     TermParameter | HoleStiffness | HoleStiffnesses | AttachmentHeight | TipMotion | GraspShift
 )
+Parameter = _Single | DentStiffness
 
 
 @dataclass(frozen=True)
@@ -134,17 +140,19 @@ def changes_of(parameter: Parameter, balance: Balance) -> list[Change]:
     Raises:
         ValueError: there is no such term, parameter, hole or holding arm.
     """
-    changes = [_change_of(parameter, balance)]
+    dents: list[Change] = [
+        SpringChange(balance.pulls(name).forces_by_modulus[:, :, None], name)
+        for name, term in balance.energy.terms.items()
+        if isinstance(term, SpringTerm)
+    ]
+    if isinstance(parameter, DentStiffness):
+        return dents
     if parameter == YOUNG_MODULUS_SCALE:
-        changes += [
-            SpringChange(balance.pulls(name).forces_by_modulus[:, :, None], name)
-            for name, term in balance.energy.terms.items()
-            if isinstance(term, SpringTerm)
-        ]
-    return changes
+        return [_change_of(parameter, balance), *dents]
+    return [_change_of(parameter, balance)]
 
 
-def _change_of(parameter: Parameter, balance: Balance) -> Change:
+def _change_of(parameter: _Single, balance: Balance) -> Change:
     """What ``parameter`` changes, by itself.
 
     Raises:

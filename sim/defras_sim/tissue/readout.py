@@ -8,7 +8,7 @@ from defras_sim.geometry import Floats
 from defras_sim.tissue import integration
 from defras_sim.tissue.assembly import ElasticBody
 from defras_sim.tissue.discs import net_force
-from defras_sim.tissue.grasp import Grasp
+from defras_sim.tissue.grasp import Grasp, term_name
 from defras_sim.tissue.material_points import MaterialTerm
 from defras_sim.tissue.springs import SpringTerm
 from defras_sim.tissue.state import TissueState, Wrench
@@ -29,8 +29,9 @@ def tissue_state(
     """Read everything off the equilibrium ``positions_m`` (nodes, 3) of ``terms``."""
     terms = list(terms)
     forces, moments = {}, {}
+    springs = {term.name: term for term in terms if isinstance(term, SpringTerm)}
     for arm, grasp in grasps.items():
-        pull = grasp.term(arm).forces_n(positions_m)
+        pull = springs[term_name(arm)].forces_n(positions_m)
         forces[arm] = grasp.force_n(pull)
         moments[arm] = grasp.moment_nm(pull, grasp.springs.rows @ positions_m)
     energy_j, wrenches = 0.0, {}

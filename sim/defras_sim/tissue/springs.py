@@ -72,6 +72,12 @@ class Springs:
         """The dent of every spring, of no depth where there is none."""
         return Dent.none(len(self.stiffness_n_per_m)) if self.dents is None else self.dents
 
+    def in_stiffer_tissue(self, factor: float) -> Springs:
+        """The same with dents in tissue that is ``factor`` times as stiff; of the same pairs."""
+        changed = Springs(self.rows, self.stiffness_n_per_m, self.dent.scaled(factor))
+        changed.__dict__["pairs"] = self.pairs
+        return changed
+
     def forces(self, positions_m: Floats, targets_m: Floats) -> Floats:
         """Generalised force (r, 3) [N] of each spring on the tissue."""
         direction, size_m = _polar(targets_m - self.rows @ positions_m)
