@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from defras_sim.effects.camera_layer import CameraLayer
 from defras_sim.effects.layers import Layers
@@ -17,6 +18,8 @@ from defras_sim.surface import Surface
 from defras_sim.tissue.mesh import Integers
 from defras_sim.tissue.state import TissueState
 from defras_sim.twin import Twin
+
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -71,8 +74,8 @@ def predict(scene: Scene, motion: RecordedMotion, rows: Integers | None = None) 
     """What the twin of ``scene``, with the effects it adopts, does along ``motion``.
 
     The arms follow every instant; the tissue is solved at ``rows`` of them (all of them, where
-    none are given), and where a grip begins or ends. Effects of history are integrated between
-    solved instants.
+    none are given), around what clouds of their stamps show, and where a grip begins or ends.
+    Effects of history are integrated between solved instants.
 
     Raises:
         NothingToGrasp: a jaw takes tissue where the twin has none.
@@ -85,13 +88,8 @@ def predict(scene: Scene, motion: RecordedMotion, rows: Integers | None = None) 
             f"the motion is one of {', '.join(sorted(motion.arms))}; the scene {scene.name} has "
             f"the arms {', '.join(scene.arms)}"
         )
-    wanted = np.ones(len(motion), bool)
-    if rows is not None:
-        wanted[:] = False
-        wanted[rows] = True
-    for arm in motion.arms.values():
-        wanted[1:] |= arm.grasped[1:] != arm.grasped[:-1]
-        wanted[0] |= arm.grasped[0]
+    layers = Layers.of(scene.model.extension)
+    wanted = _wanted(motion, rows, layers.delay_s)
     solved = np.flatnonzero(wanted)
     twin = Twin(scene, start_s=float(motion.time_s[0]))
     states: list[TissueState] = []
@@ -109,7 +107,6 @@ def predict(scene: Scene, motion: RecordedMotion, rows: Integers | None = None) 
         states.append(twin.track(tips, time_s))
         for name, poses in measured.items():
             poses.append(twin.measured(name))
-    layers = Layers.of(scene.model.extension)
     return Prediction(
         rows=solved,
         time_s=motion.time_s[solved],
@@ -118,3 +115,18 @@ def predict(scene: Scene, motion: RecordedMotion, rows: Integers | None = None) 
         camera=CameraLayer(scene.depth_camera, layers.camera),
         delay_s=layers.delay_s,
     )
+
+
+def _wanted(motion: RecordedMotion, rows: Integers | None, delay_s: float) -> Mask:
+    """The instants (n,) of ``motion`` at which the tissue is to be solved."""
+    if rows is None:
+        return np.ones(len(motion), bool)
+    wanted = np.zeros(len(motion), bool)
+    wanted[rows] = True
+    if delay_s > 0.0:
+        after = np.searchsorted(motion.time_s, motion.time_s[rows] - delay_s)
+        wanted[after] = wanted[np.maximum(after - 1, 0)] = True
+    for arm in motion.arms.values():
+        wanted[1:] |= arm.grasped[1:] != arm.grasped[:-1]
+        wanted[0] |= arm.grasped[0]
+    return wanted

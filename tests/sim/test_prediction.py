@@ -94,6 +94,16 @@ def test_a_late_camera_shows_what_was() -> None:
     )
 
 
+def test_what_a_late_camera_shows_is_solved_where_it_was() -> None:
+    """Between the few instants asked for, the lift is no straight line."""
+    hidden: Extension = {"camera_latency": {"delay_s": 0.35}}
+    few = predict(scene().extended(hidden), motion(), np.array([5, 17, 24]))
+    every = predicted(("camera_latency", (("delay_s", 0.35),)))
+    for stamp_s in (1.7, 2.4):
+        shown = [p.surface_shown(stamp_s).vertices_m for p in (few, every)]
+        assert np.abs(shown[0] - shown[1]).max() < 2e-5
+
+
 def test_a_slip_lets_tissue_and_force_down_from_then_on() -> None:
     plain = predicted()
     slipped = predicted(("grasp_slip", (("distance_m", 0.006), ("time_s", 1.6))))
