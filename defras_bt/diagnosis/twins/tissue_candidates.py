@@ -11,9 +11,6 @@ from defras_sim.effects.library import effects
 SHAFT = ("q1", "q2", "q3")
 WRIST = ("q4", "q5", "q6")
 
-_NUISANCES = ("camera_registration",)
-"""Explains a little of everything that lasts, so it is re-tuned before others are judged."""
-
 # What a single retraction cannot tell from the effect's strength keeps its usual value.
 _KEPT = {"attachment_tear": ("force_n",), "softening": ("width",)}
 
@@ -57,7 +54,7 @@ def _of(effect: Effect) -> Iterator[Candidate]:
     else:
         kept = _KEPT.get(effect.name, ())
         free = tuple(p for p in effect.parameters if p.name not in kept)
-        yield Candidate(effect, free, nuisance=effect.name in _NUISANCES)
+        yield Candidate(effect, free)
         return
     for site, starts in sites.items():
         free = tuple(p for p in effect.parameters if p.strength and p.name.startswith(starts))
