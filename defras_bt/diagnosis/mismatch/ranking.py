@@ -8,7 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from defras_bt.diagnosis.mismatch.finding import MismatchCause, MismatchFinding
-from defras_bt.diagnosis.mismatch.rivals import STILL, Rival, moved_cameras, moved_patches
+from defras_bt.diagnosis.mismatch.rivals import (
+    STILL,
+    Rival,
+    moved_arms,
+    moved_cameras,
+    moved_patches,
+)
 from defras_bt.learning.estimate import AttachmentEstimator, Keyframe
 from defras_bt.learning.evidence import compare
 from defras_bt.learning.hold_out import Split, split
@@ -21,7 +27,7 @@ from defras_sim.scene import Camera, Scene
 _TOLD: Mapping[MismatchCause, str] = {
     "grasp": "the tissue slipped in the jaw {size}",
     "camera": "the depth camera was moved {size}",
-    "arm": "the tip is not where it is told to be: what it holds is off the tip {size}",
+    "arm": "the tip is not where it is told to be: what it holds is off {size}",
 }
 
 
@@ -85,6 +91,7 @@ class MismatchRanking:
         rivals = [
             *moved_cameras(fitted, surfaces, camera),
             *moved_patches(fitted, replay, keyframes, surfaces, camera),
+            *moved_arms(fitted, belief, keyframes, surfaces),
         ]
         before = _distances(plain, parts, camera)
         if before is None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,9 +12,9 @@ from defras_bt.diagnosis.mismatch.finding import MismatchCause
 from defras_bt.learning.estimate import Keyframe
 from defras_bt.learning.misfit import misfit
 from defras_bt.learning.registration import fitted_registration
-from defras_bt.learning.replay import Replay
+from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_sim.geometry import Floats, Pose
-from defras_sim.scene import Camera
+from defras_sim.scene import Camera, Scene
 from defras_sim.surface import Surface
 
 STILL = Pose(np.zeros(3))
@@ -92,6 +92,56 @@ def moved_patches(
                     yield rival
 
 
+def moved_arms(
+    points_m: Sequence[Floats],
+    belief: Scene,
+    keyframes: Sequence[Keyframe],
+    surfaces: Sequence[Surface],
+) -> Iterator[Rival]:
+    """The arms are registered to the tissue with an error: all of them have been off by the same
+    all along, and took the tissue beside where they should have."""
+    camera = belief.depth_camera
+    fitted = [i for i, points in enumerate(points_m) if len(points)]
+    columns = []
+    for axis in np.eye(3):
+        shapes = _registered(belief, keyframes, _PROBE_M * axis)
+        if shapes is None:
+            return
+        columns.append(
+            [
+                (s.vertices_m - b.vertices_m) / _PROBE_M
+                for s, b in zip(shapes, surfaces, strict=True)
+            ]
+        )
+    linear = {i: np.stack([column[i] for column in columns], axis=2) for i in fitted}
+    shift_m = _fitted_shift(points_m, surfaces, linear, fitted, camera)
+    shapes = None if shift_m is None else _registered(belief, keyframes, shift_m)
+    if shift_m is None or shapes is None:
+        return
+    size = f"by {1e3 * float(np.linalg.norm(shift_m)):.1f} mm"
+    yield Rival("arm", shapes, (STILL,) * len(shapes), size)
+
+
+def _registered(
+    belief: Scene, keyframes: Sequence[Keyframe], shift_m: Floats
+) -> tuple[Surface, ...] | None:
+    """Surfaces if every tip were ``shift_m`` (3,) off, also when its jaw closed; None where the
+    model does not follow."""
+    moved = [
+        replace(
+            frame,
+            grasp_tips={arm: tip.moved(shift_m) for arm, tip in frame.grasp_tips.items()},
+            tips={arm: tip.moved(shift_m) for arm, tip in frame.tips.items()},
+        )
+        for frame in keyframes
+    ]
+    try:
+        states = Replay(belief, moved).repeat(belief.hole_stiffness_n_per_m(belief.attached))
+    except NotRepeatable:
+        return None
+    return tuple(state.surface for state in states)
+
+
 def _slopes(replay: Replay, frame: int, arm: str, surface: Surface) -> Floats | None:
     """Motion (vertices, 3, 3) of the surface per metre of motion of the held patch along x, y, z;
     None where the model does not follow."""
@@ -107,7 +157,7 @@ def _slopes(replay: Replay, frame: int, arm: str, surface: Surface) -> Floats | 
 def _fitted_shift(
     points_m: Sequence[Floats],
     surfaces: Sequence[Surface],
-    linear: dict[int, Floats | None],
+    linear: Mapping[int, Floats | None],
     frames: Sequence[int],
     camera: Camera,
 ) -> Floats | None:
@@ -166,5 +216,5 @@ def _patch(
         "grasp" if slipped else "arm",
         tuple(shapes),
         (STILL,) * len(surfaces),
-        f"of {arm.upper()} by {1e3 * size_m:.1f} mm",
+        f"{f'of {arm.upper()} ' if slipped else ''}by {1e3 * size_m:.1f} mm",
     )

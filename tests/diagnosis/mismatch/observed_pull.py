@@ -35,15 +35,18 @@ def held_scene(rows: Sequence[str] = FRAME) -> Scene:
 def observed(
     actual: Scene,
     *,
+    grasp: Pose = GRASP,
     slips_m: Sequence[Floats] = (np.zeros(3),) * FRAMES,
     camera_moved: Sequence[Pose] = (Pose(np.zeros(3)),) * FRAMES,
     seed: int = 1,
 ) -> list[Keyframe]:
-    """Frames of a slanted pull. What is held is ``slips_m`` (3,) off the tip in each frame, and
-    clouds are moved by ``camera_moved``."""
+    """Frames of a slanted pull, taken at ``grasp`` instead of where the arm believes.
+
+    What is held is ``slips_m`` (3,) off the tip in each frame; ``camera_moved`` moves the clouds.
+    """
     rng = np.random.default_rng(seed)
     model = TissueModel(actual, elements_xyz=(10, 10, 1))
-    model.grasp("psm1", GRASP)
+    model.grasp("psm1", grasp)
     frames = []
     for number in range(FRAMES):
         tip = GRASP.moved(WAY_M * (number + 1) / FRAMES)

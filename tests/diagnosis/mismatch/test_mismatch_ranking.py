@@ -75,6 +75,14 @@ def test_a_tip_that_is_elsewhere_is_the_arms_fault():
     assert found.explained["arm"] > found.explained["camera"]
 
 
+def test_arms_registered_with_an_error_took_the_tissue_elsewhere():
+    off_m = np.array([0.0, 0.006, 0.0])
+    found = explain(observed(held_scene(), grasp=GRASP.moved(off_m), slips_m=[off_m] * FRAMES))
+    assert found.cause == "arm"
+    size_mm = float(found.sentence.split("off by ")[1].split(" mm")[0])
+    assert size_mm == pytest.approx(6.0, abs=1.5)
+
+
 def test_a_camera_that_was_bumped_is_moved_back():
     bump = Pose(np.array([0.003, -0.002, 0.004])).moved(np.zeros(3), np.array([0.0, 0.03, 0.0]))
     found = explain(observed(held_scene(), camera_moved=[STILL] * 2 + [bump] * 3))
