@@ -21,8 +21,9 @@ STIFFNESS_PA_PER_M = 3e7
 CLEARANCE_M = 5e-5
 # The stiffness sets in over this depth, so that the tangent has no jumps.
 ONSET_M = 2e-4
-# Quadratic faces may bulge below their nodes by less than this.
-_BULGE_M = 2e-3
+# No point of a quadratic face is farther below its lowest node than so many times the difference of
+# its highest and lowest: what the negative ones of its shape functions add up to, at most.
+_BULGE = 1.0
 
 
 @dataclass(frozen=True)
@@ -99,11 +100,11 @@ def _depth(heights: Floats, shares: Floats, bed: float) -> float:
 @jit
 def _touches(positions: Floats, nodes: Integers, bed: float, heights: Floats) -> bool:
     """Write the heights of a face's ``nodes``; whether the face may be below the bed."""
-    lowest = np.inf
+    lowest, highest = np.inf, -np.inf
     for a in range(len(nodes)):
         heights[a] = positions[nodes[a], 2]
-        lowest = min(lowest, heights[a])
-    return lowest < bed + _BULGE_M
+        lowest, highest = min(lowest, heights[a]), max(highest, heights[a])
+    return lowest - _BULGE * (highest - lowest) < bed
 
 
 @jit

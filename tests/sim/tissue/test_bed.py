@@ -138,3 +138,23 @@ def test_tissue_stays_off_the_bed_between_its_nodes_too(material, ways):
         assert state.converged
         for face in faces:
             assert (face @ state.nodes_m)[:, 2].min() > bed.height_m - MOST_DEPTH_M
+
+
+@pytest.mark.parametrize("bulge_m", [1e-3, 4e-3, 0.02])
+def test_a_face_that_bulges_deep_below_its_nodes_touches_without_a_jump(bulge_m):
+    """Strongly stretched elements do; contact that set in late would have no equilibrium."""
+    mesh = slab("hexahedron20", (1, 1, 1))
+    bed = bed_under(mesh, Tissue())
+    x = mesh.nodes_m.copy()
+    lower = np.isclose(x[:, 2], x[:, 2].min())
+    corners = lower & (np.abs(x[:, :2]).min(axis=1) > 0.01)
+    # In the middle the mid-side nodes count half each, the corners a quarter, negatively.
+    x[corners, 2] += 4 * bulge_m
+    x[lower & ~corners, 2] += bulge_m
+    heights_m = np.linspace(bed.height_m - bulge_m, bed.height_m + 2 * bulge_m, 4000)
+    forces_n = np.array(
+        [replace(bed, height_m=z).energy_and_gradient(x)[1][:, 2].sum() for z in heights_m]
+    )
+    stiffest = STIFFNESS_PA_PER_M * bed.boundary.areas_m2.sum()
+    assert np.abs(np.diff(forces_n)).max() <= 1.01 * stiffest * (heights_m[1] - heights_m[0])
+    assert np.ptp(forces_n) > 0
