@@ -144,6 +144,21 @@ def test_a_run_without_joints_or_grasp_sensor(tmp_path: Path, run: SyntheticRun)
     assert kept == {"/PSM1/measured_cp", "/PSM1/setpoint_cp", "/PSM1/jaw/measured_js"}
 
 
+def test_a_measured_force_is_a_wrench_of_the_tissue_frame(
+    tmp_path: Path, run: SyntheticRun
+) -> None:
+    recorder = BagRecorder(tmp_path / "r.mcap")
+    recorder.start(run.info)
+    first = run.ticks()[0]
+    arm = replace(first.observation.arms["psm1"], force_n=np.array([0.01, -0.02, 0.3]))
+    recorder.tick(replace(first, observation=replace(first.observation, arms={"psm1": arm})))
+    recorder.finish(RunSummary({}))
+    felt = read_bag(tmp_path / "r.mcap")["/PSM1/body/measured_cf"]
+    assert felt.message_type == "geometry_msgs/msg/WrenchStamped"
+    assert felt.frame_id == "tissue"
+    assert felt.values.tolist() == [[0.01, -0.02, 0.3, 0.0, 0.0, 0.0]]
+
+
 def test_a_ros_1_bag_is_read_and_strangers_are_named(tmp_path: Path) -> None:
     store = get_typestore(Stores.ROS1_NOETIC)
     types = store.types

@@ -30,6 +30,7 @@ def told(rng: np.random.Generator, time_s: float) -> SensedObservation:
         grasped=(None, True, False)[int(rng.integers(3))],
         joints=None if rng.random() < 0.5 else rng.normal(size=6),
         setpoint_joints=rng.normal(size=6),
+        force_n=None if rng.random() < 0.5 else rng.normal(size=3),
     )
     points = rng.normal(size=(30, 3)).astype(np.float32).astype(float)
     return SensedObservation(
@@ -109,7 +110,10 @@ def _plain(seen: SensedObservation) -> tuple[object, ...]:
                 [pose.position_m.tolist(), pose.rotation.tolist()]
                 for pose in (arm.tissue_from_tip, arm.setpoint_tissue_from_tip)
             ),
-            *(None if j is None else j.tolist() for j in (arm.joints, arm.setpoint_joints)),
+            *(
+                None if j is None else j.tolist()
+                for j in (arm.joints, arm.setpoint_joints, arm.force_n)
+            ),
         ]
         for name, arm in seen.arms.items()
     ]
