@@ -21,6 +21,7 @@ from defras_bt.diagnosis.fitting import (
 from defras_bt.diagnosis.further import measure_further
 from defras_bt.diagnosis.intervals import estimates, standard_errors
 from defras_bt.diagnosis.outside import left_over
+from defras_bt.diagnosis.plain_squares import fit_plainly
 from defras_bt.diagnosis.problem import Candidate, Problem, Remarking
 from defras_bt.diagnosis.selection import Progress, select
 from defras_bt.diagnosis.sets import rivals
@@ -70,6 +71,7 @@ def diagnose(
     try:
         _look(found, told)
         select(found.search, told)
+        fit_plainly(found.search)
         _settle(found, told)
         told("what was gained on other data", 0.9)
         measure_further(found, beyond_range, new_grasp)
@@ -126,7 +128,7 @@ def _arrived(found: Findings) -> None:
         return standard_errors(
             fit.jacobian,
             fit.residual,
-            search.noise,
+            search.fitted_with or search.noise,
             search.samples,
             search.settings.surrogates,
             search.rng,
@@ -134,7 +136,7 @@ def _arrived(found: Findings) -> None:
 
     widths = np.clip(errors(search.fit), _NARROWEST, _WIDEST)
     fresh = differentiate(search.counted, search.fit, widths)
-    search.fit = refine(search.counted, fresh, search.noise, iterations=2)
+    search.fit = refine(search.counted, fresh, search.fitted_with or search.noise, iterations=2)
     # The steps just made keep derivatives current on too small a scale.
     known = errors(replace(search.fit, jacobian=fresh.jacobian))
     problem = search.counted.problem

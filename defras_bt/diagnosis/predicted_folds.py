@@ -24,17 +24,27 @@ class HeldOut:
         return float(self.loss.total[0])
 
 
-def hold_out(residual: Floats, columns: Floats, noise: Noise, fold: Integers, kept: int) -> HeldOut:
+def hold_out(
+    residual: Floats,
+    columns: Floats,
+    noise: Noise,
+    fold: Integers,
+    kept: int,
+    fitted_with: Noise | None = None,
+) -> HeldOut:
     """Fit ``columns`` (n, k) to ``residual`` (n,) without each fold and predict it.
 
     ``residual`` is of a fit; the last columns, from ``kept`` on, are of nuisances, which lower the
-    loss but are not part of the model that is reported in ``HeldOut.residual``.
+    loss but are not part of the model that is reported in ``HeldOut.residual``. That is fitted as
+    if the noise were ``fitted_with`` where this is another than ``noise``.
     """
     filled = np.where(noise.seen, residual, 0.0)[:, None]
     found = products(noise.whiten(columns), noise.whiten(filled), fold)
     loss = losses(found, np.arange(columns.shape[1]))
     predicted = residual.copy()
     if kept:
+        if fitted_with is not None:
+            found = products(fitted_with.whiten(columns), fitted_with.whiten(filled), fold)
         plain = losses(found, np.arange(kept))
         for index, one in enumerate(np.unique(fold)):
             rows = fold == one

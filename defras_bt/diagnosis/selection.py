@@ -52,7 +52,8 @@ Progress = Callable[[str, float], None]
 @dataclass
 class Search:
     """What the selection has found so far; kept up to date, so that an interrupted search can be
-    reported."""
+    reported. ``fitted_with``: as if the noise were this parameters were fitted in the end, where
+    that predicts better than ``noise``."""
 
     counted: CountedProblem
     samples: Samples
@@ -62,6 +63,7 @@ class Search:
     rng: np.random.Generator
     fit: Fit
     noise: Noise
+    fitted_with: Noise | None = None
     fits: dict[str, dict[str, Fit]] = field(default_factory=dict)
     history: list[Fit] = field(default_factory=list)
     rounds: list[Round] = field(default_factory=list)
@@ -90,7 +92,8 @@ class Search:
     def held_out(self, fit: Fit, noise: Noise, *without: str) -> HeldOut:
         """``fit`` with every fold predicted from the others, nuisances re-tuned."""
         columns = np.concatenate((fit.jacobian, self.nuisance_columns(*without)), axis=1)
-        return hold_out(fit.residual, columns, noise, self.samples.fold, len(fit.free))
+        folds = self.samples.fold
+        return hold_out(fit.residual, columns, noise, folds, len(fit.free), self.fitted_with)
 
 
 def select(search: Search, told: Progress) -> None:

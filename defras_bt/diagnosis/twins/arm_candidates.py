@@ -38,7 +38,10 @@ def joint_candidates(
     found: list[Candidate] = []
     for joint in measured:
         index = JOINTS.index(joint)
-        found.append(Candidate(JOINT_OFFSET, (JOINT_OFFSET.parameters[index],), joint))
+        # What every calibration leaves; it would explain a little of everything.
+        found.append(
+            Candidate(JOINT_OFFSET, (JOINT_OFFSET.parameters[index],), joint, nuisance=True)
+        )
         if joint in moving:
             found.append(Candidate(SERVO_LAG, (SERVO_LAG.parameters[index],), joint))
             found.append(_play(joint, measured))

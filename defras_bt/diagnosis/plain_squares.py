@@ -1,0 +1,43 @@
+"""Parameters by plain squares, where these predict better than whitened ones.
+
+Generalised least squares knows parameters best *if* the model with the named causes is true but for
+noise. It trusts what changes fast, because the noise does not. Where a cause is only nearly right
+(real play has no sharp corners) that is the part which is wrong, and a fit to all of the residual
+predicts held-out data much better. Which of the two it is, these data themselves say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from defras_bt.diagnosis.excess import excess
+from defras_bt.diagnosis.fitting import refine
+from defras_bt.diagnosis.noise import estimate_noise
+from defras_bt.diagnosis.selection import Search
+
+_ROUNDS = 3
+"""Of fits, each with weights of what the last one left over."""
+
+
+def fit_plainly(search: Search) -> None:
+    """Fit what was accepted by plain squares, and keep that if held-out data ask for it.
+
+    The noise by which chance is judged stays autocorrelated.
+    """
+    if not search.fit.free:
+        return
+    orders = np.zeros(len(search.samples.channels), np.int64)
+    fit = search.fit
+    white = estimate_noise(fit.residual, search.samples, search.layout, orders.tolist())
+    for _ in range(_ROUNDS):
+        fit = refine(search.counted, fit, white, iterations=search.settings.iterations)
+        white = estimate_noise(fit.residual, search.samples, search.layout, orders.tolist())
+    now = excess(search.held_out(search.fit, search.noise).residual, search.samples)
+    plain = replace(search, fit=fit, fitted_with=white)
+    then = excess(plain.held_out(fit, search.noise).residual, search.samples)
+    if then < (1.0 - search.settings.relative_gain) * now:
+        search.fit, search.fitted_with = fit, white
+        search.noise = estimate_noise(fit.residual, search.samples, search.layout)
+        search.history.append(fit)
