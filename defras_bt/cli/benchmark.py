@@ -9,6 +9,7 @@ import typer
 
 from defras_bt.benchmark.files import write_benchmark
 from defras_bt.benchmark.planner import planning_times
+from defras_bt.cli.benchmark_blame import blame
 from defras_bt.cli.benchmark_executive import executive
 from defras_bt.cli.benchmark_faults import faults
 from defras_bt.cli.benchmark_monitor import monitor
@@ -24,6 +25,7 @@ def benchmarks() -> None:
     """Measure, and leave NAME.json, NAME.csv and NAME.html."""
 
 
+app.command("blame")(blame)
 app.command("executive")(executive)
 app.command("table1")(table1)
 app.command("table2")(table2)
