@@ -11,7 +11,6 @@ from defras_sim.geometry import Pose
 from defras_sim.scene import RIGID_HOLE_N_PER_M, Attachments, Scene
 from tests.sim.effects.extended_motion import (
     ARM,
-    FOLDED,
     GRASPED,
     HALFWAY,
     RAISED,
@@ -180,13 +179,3 @@ def test_what_no_tissue_can_be_is_refused_in_words() -> None:
         extended({"gravity": {"acceleration_m_s2": 3.0}}, bed=False)
     with pytest.raises(ValueError, match="missing_attachment: share should be between 0 and 1"):
         extended({"missing_attachment": {"share": 1.5}})
-
-
-def test_an_absurd_motion_ends_stale_and_finite() -> None:
-    tissue = extended({"bed_adhesion": {"strength_pa": 200.0}})
-    raised = retract(tissue, HALFWAY)
-    state = tissue.solve({ARM: Pose(np.array([0.5, 0.0, 0.3]))}, 2.0)
-    assert not state.converged
-    assert np.isfinite(state.nodes_m).all()
-    assert raised.converged
-    assert np.isfinite(tissue.solve({ARM: FOLDED}, 3.0).nodes_m).all()

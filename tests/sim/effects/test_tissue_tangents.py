@@ -12,7 +12,15 @@ from defras_sim.effects.extended_tissue import ExtendedTissue
 from defras_sim.effects.tissue_effect import Direction, TissueEffect
 from defras_sim.geometry import Floats
 from defras_sim.tissue.state import TissueState
-from tests.sim.effects.extended_motion import ARM, FOLDED, HALFWAY, RAISED, extended, retract
+from tests.sim.effects.extended_motion import (
+    ARM,
+    FOLDED,
+    GRASPED,
+    HALFWAY,
+    RAISED,
+    extended,
+    retract,
+)
 
 EFFECTS = {e.name: e for e in library.effects("tissue") if isinstance(e, TissueEffect)}
 PATCH = {"x_m": -0.002, "y_m": 0.015, "radius_m": 0.015}
@@ -39,6 +47,9 @@ ABSENT = {
 """Effects with exact derivatives where they are absent."""
 
 
+DISCS = {"attachment_tear", "extra_attachment", "inclusion", "missing_attachment"}
+
+
 @pytest.fixture(scope="module")
 def plain() -> TissueState:
     return retract(extended({}), HALFWAY, RAISED, FOLDED)
@@ -50,6 +61,19 @@ def test_an_effect_at_its_null_values_is_nothing(name: str, plain: TissueState) 
     np.testing.assert_array_equal(state.nodes_m, plain.nodes_m)
     np.testing.assert_array_equal(state.grasp_forces_n[ARM], plain.grasp_forces_n[ARM])
     assert state.largest_principal_stress_pa == plain.largest_principal_stress_pa
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_at_the_bounds_of_their_strengths_effects_end_finite(name: str) -> None:
+    """In equilibrium, or in a stale state that says so."""
+    strengths = {p.name: p.upper for p in EFFECTS[name].parameters if p.strength}
+    tissue = extended({name: {**strengths, "radius_m": 0.03} if name in DISCS else strengths})
+    tissue.solve({}, 0.0)
+    tissue.grasp(ARM, GRASPED)
+    for time_s, pose in ((0.2, HALFWAY), (0.5, RAISED), (0.8, GRASPED)):
+        state = tissue.solve({ARM: pose}, time_s)
+        assert np.isfinite(state.nodes_m).all()
+        assert np.isfinite(state.grasp_forces_n[ARM]).all()
 
 
 def moved(name: str, values: Mapping[str, float]) -> ExtendedTissue:
