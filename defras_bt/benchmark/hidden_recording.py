@@ -14,7 +14,6 @@ import numpy as np
 
 from defras_bt.benchmark.hidden_noise import CameraNoise, ForceNoise, NoiseSpectrum
 from defras_bt.benchmark.hidden_retraction import Script
-from defras_bt.diagnosis.twins.tissue_frames import extended
 from defras_bt.recording.readings_bag import ReadingsBag
 from defras_sim.effects.effect import Extension
 from defras_sim.scene import Scene
@@ -33,7 +32,7 @@ def reality(
     elements_xyz: tuple[int, int, int] = ELEMENTS_XYZ,
 ) -> Scene:
     """What is really there where ``scene`` is believed and the effects ``hidden`` are not known."""
-    actual = extended(scene, hidden)
+    actual = scene.extended({**scene.model.extension, **hidden})
     arms = {
         name: arm.model_copy(update={"force_noise_sd_n": 0.0 if with_force else None})
         for name, arm in actual.arms.items()

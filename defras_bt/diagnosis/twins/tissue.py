@@ -18,9 +18,10 @@ from defras_bt.diagnosis.twins.tissue_frames import TissueFrames, frames_of
 from defras_bt.diagnosis.twins.tissue_part import TissuePart
 from defras_bt.diagnosis.twins.tissue_phases import PHASES
 from defras_bt.diagnosis.twins.tissue_signals import Layout, gone_m, noise_sd
+from defras_bt.diagnosis.twins.tissue_systematic import systematic_errors
 from defras_bt.diagnosis.twins.tissue_tangents import TissueTangents
 from defras_bt.diagnosis.twins.tissue_trajectory import MOST_FRAMES, Trajectory, trajectory
-from defras_sim.effects.effect import Extension
+from defras_sim.effects.effect import Extension, Values
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 from defras_sim.tissue.model import NothingToGrasp
@@ -98,6 +99,12 @@ class TissueProblem:
             found = TissueTangents(self.scene, whole, parts, self.candidates, self._jobs)
             self._tangents = (key, found)
         return self._tangents[1].of(candidate)
+
+    def systematic(self, model: Extension, candidate: Candidate) -> Values:
+        """Standard error by parameter that the twin's own approximations make."""
+        return systematic_errors(
+            self.samples, self.residual(model), candidate, self.tangents(model, candidate)
+        )
 
     def frames(self, model: Extension) -> tuple[TissueFrames, ...] | None:
         """What ``model`` says of the frames of every trajectory; None where it cannot."""

@@ -12,7 +12,7 @@ from defras_bt.diagnosis.twins.tissue_trajectory import Trajectory
 from defras_sim.effects.effect import Extension
 from defras_sim.geometry import Floats, Pose
 from defras_sim.prediction import predict
-from defras_sim.scene import AdoptedEffect, ModelExtension, Scene
+from defras_sim.scene import Scene
 from defras_sim.surface import Surface
 
 
@@ -31,20 +31,13 @@ class TissueFrames:
     corrected: Callable[[Floats], Floats]
 
 
-def extended(scene: Scene, model: Extension) -> Scene:
-    """``scene`` with the effects of ``model`` besides those that it has, or in their place."""
-    effects = {**scene.model.extension, **model}
-    adopted = tuple(
-        AdoptedEffect.model_validate({"effect": name, **values}) for name, values in effects.items()
-    )
-    return scene.model_copy(update={"model": ModelExtension(effects=adopted)})
-
-
 def frames_of(
     scene: Scene, model: Extension, trajectory: Trajectory, chosen: Integers | None = None
 ) -> TissueFrames:
-    """The frames of ``trajectory``, or those ``chosen`` of them, as ``scene`` extended by ``model``
-    says that they are. The tissue is solved at these only, and where a grip begins or ends.
+    """The frames of ``trajectory``, or those ``chosen`` of them, as ``scene`` says that they are
+    with the effects of ``model`` besides its own, or in their place.
+
+    The tissue is solved at these only, and where a grip begins or ends.
 
     Raises:
         NothingToGrasp: a jaw takes tissue where the model has none.
@@ -52,7 +45,7 @@ def frames_of(
     """
     every = np.arange(len(trajectory.frames)) if chosen is None else chosen
     rows = trajectory.frames[every]
-    found = predict(extended(scene, model), trajectory.motion, rows)
+    found = predict(scene.extended({**scene.model.extension, **model}), trajectory.motion, rows)
     at = np.searchsorted(found.rows, rows)
     shown = [found.surface_shown(float(t)) for t in trajectory.motion.time_s[rows]]
     return TissueFrames(

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from defras_bt.diagnosis.problem import Integers
-from defras_bt.diagnosis.twins.tissue_frames import extended
 from defras_bt.diagnosis.twins.tissue_trajectory import Trajectory
 from defras_sim.effects.effect import Effect, Extension, Values
 from defras_sim.effects.extended_tissue import ExtendedTissue
@@ -53,9 +52,12 @@ class KeyShape:
 
 @dataclass(frozen=True)
 class PassJob:
-    """What a process needs to know. ``chosen`` (k,): keyframes by index of the frame.
+    """What a process needs to know.
+
+    ``model``: all effects, the scene's included. ``chosen`` (k,): keyframes by index of the frame.
     ``watched``: effects of the tissue that go along. ``aside_m`` (2,): how far beside its place
-    each jaw takes the tissue, and keeps it."""
+    each jaw takes the tissue, and keeps it.
+    """
 
     scene: Scene
     model: Extension
@@ -72,8 +74,7 @@ def run_pass(job: PassJob, known: Mapping[str, Effect]) -> tuple[KeyShape | None
     Raises:
         NothingToGrasp: a jaw takes tissue where the model has none.
     """
-    scene = extended(job.scene, job.model)
-    layers = Layers.of(scene.model.extension)
+    scene, layers = job.scene, Layers.of(job.model)
     watched: dict[str, Values] = {
         name: {} for name in job.watched if isinstance(known[name], TissueEffect)
     }
