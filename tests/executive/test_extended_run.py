@@ -67,7 +67,7 @@ def run(adopted: Extension) -> Readings:
             tree_file=resource("trees/fras.yaml"),
             seed=0,
             force_threshold_n=1.0,
-            max_time_s=8.0,
+            max_time_s=6.5,
         ),
         [readings],
     )
