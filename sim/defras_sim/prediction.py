@@ -21,6 +21,9 @@ from defras_sim.twin import Twin
 
 Mask = NDArray[np.bool_]
 
+# A solve that leads nowhere takes seconds, and the next one leads from there.
+MOST_LOST = 3
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -75,7 +78,8 @@ def predict(scene: Scene, motion: RecordedMotion, rows: Integers | None = None) 
 
     The arms follow every instant; the tissue is solved at ``rows`` of them (all of them, where
     none are given), around what clouds of their stamps show, and where a grip begins or ends.
-    Effects of history are integrated between solved instants.
+    Effects of history are integrated between solved instants. A model that was lost three times in
+    a row is not asked again until a grip begins or ends.
 
     Raises:
         NothingToGrasp: a jaw takes tissue where the twin has none.
@@ -94,17 +98,20 @@ def predict(scene: Scene, motion: RecordedMotion, rows: Integers | None = None) 
     twin = Twin(scene, start_s=float(motion.time_s[0]))
     states: list[TissueState] = []
     measured: dict[str, list[Pose]] = {name: [] for name in motion.arms}
+    lost = 0
     for row in range(int(solved[-1]) + 1 if len(solved) else 0):
         time_s, tips = float(motion.time_s[row]), motion.tips(row)
         if not wanted[row]:
             twin.follow(tips, time_s)
             continue
-        for name, arm in motion.arms.items():
-            if arm.grasped[row] and name not in twin.holding:
-                twin.grasp(name, tips[name], time_s)
-            elif name in twin.holding and not arm.grasped[row]:
-                twin.release(name, time_s)
-        states.append(twin.track(tips, time_s))
+        if _regripped(twin, motion, row):
+            lost = 0
+        if lost < MOST_LOST:
+            states.append(twin.track(tips, time_s))
+            lost = 0 if states[-1].converged else lost + 1
+        else:
+            twin.follow(tips, time_s)
+            states.append(states[-1])
         for name, poses in measured.items():
             poses.append(twin.measured(name))
     return Prediction(
@@ -115,6 +122,18 @@ def predict(scene: Scene, motion: RecordedMotion, rows: Integers | None = None) 
         camera=CameraLayer(scene.depth_camera, layers.camera),
         delay_s=layers.delay_s,
     )
+
+
+def _regripped(twin: Twin, motion: RecordedMotion, row: int) -> bool:
+    """Let ``twin`` hold what is held at an instant of ``motion``; whether that is something else
+    than before."""
+    before, time_s = twin.holding, float(motion.time_s[row])
+    for name, arm in motion.arms.items():
+        if arm.grasped[row] and name not in before:
+            twin.grasp(name, arm.tip(row), time_s)
+        elif name in before and not arm.grasped[row]:
+            twin.release(name, time_s)
+    return twin.holding != before
 
 
 def _wanted(motion: RecordedMotion, rows: Integers | None, delay_s: float) -> Mask:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from defras_sim.effects.effect import Extension
-from defras_sim.prediction import Prediction, predict
+from defras_sim.geometry import Pose
+from defras_sim.prediction import MOST_LOST, Prediction, predict
 from defras_sim.recorded_motion import ArmMotion, RecordedMotion
 from defras_sim.scene import Attachments, Roi, Scene
-from defras_sim.tissue.model import NothingToGrasp
+from defras_sim.tissue.model import NothingToGrasp, TissueModel
+from defras_sim.tissue.state import TissueState
 from defras_sim.twin import Twin
 from defras_sim.worlds.kinematic_tool import POINTING_DOWN
 from defras_sim.worlds.protocol import PointCloud
@@ -175,6 +179,26 @@ def test_clouds_are_led_back_through_camera_and_clock() -> None:
     assert true.stamp_s == pytest.approx(1.9)
     assert np.allclose(true.points_m, [-0.003, 0.0, 0.0])
     assert Twin(scene()).corrected(cloud) is cloud
+
+
+def test_a_model_that_is_lost_is_not_asked_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[float] = []
+    solve = TissueModel.solve
+
+    def lost_when_lifted(model: TissueModel, tips: Mapping[str, Pose]) -> TissueState:
+        state = solve(model, tips)
+        if not any(tip.position_m[2] > 0.005 for tip in tips.values()):
+            return state
+        asked.append(tips["psm1"].position_m[2])
+        return replace(state, converged=False)
+
+    monkeypatch.setattr(TissueModel, "solve", lost_when_lifted)
+    prediction = predict(scene(), motion())
+    assert len(asked) == MOST_LOST
+    unknown = np.isnan(prediction.vertices_m).any(axis=(1, 2))
+    assert np.array_equal(unknown, np.isnan(prediction.force_n("psm1")).any(axis=1))
+    lost = (prediction.time_s > 0.8 + 1e-6) & (prediction.time_s < RELEASE_S - 1e-6)
+    assert np.array_equal(unknown, lost), "let go, the tissue is at rest again"
 
 
 def test_what_cannot_be_predicted_is_refused() -> None:
