@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from py_trees.common import Status
@@ -13,6 +13,9 @@ from defras_bt.executive.node import Node, NodeParameters, Role
 from defras_bt.executive.operator_nodes import HOLDING_CODES
 from defras_bt.executive.reasons import Code
 from defras_bt.executive.registry import register_node
+
+if TYPE_CHECKING:
+    from defras_bt.executive.context import Context
 
 
 class Guard(Node):
@@ -35,6 +38,12 @@ class PatienceParameters(NodeParameters):
     """``patience_s``: how long the force may stay over its threshold at half speed."""
 
     patience_s: Annotated[float, Field(ge=0)] = 0.5
+
+
+class ReadingsParameters(NodeParameters):
+    """``readings``: in so many in a row enough has to be seen; one alone may be false."""
+
+    readings: Annotated[int, Field(ge=1)] = 3
 
 
 class TravelParameters(NodeParameters):
@@ -152,15 +161,43 @@ class ForceAccepted(Guard):
 
 @register_node
 class RegionVisible(Guard):
-    """Succeeds if enough of the region of interest is seen."""
+    """Succeeds if enough of the region of interest is seen, in several readings in a row.
+
+    A tick in which it was not asked interrupts the row: nobody knows what was seen then.
+    """
+
+    Parameters = ReadingsParameters
+    parameters: ReadingsParameters
+
+    def __init__(self, name: str, context: Context, parameters: ReadingsParameters) -> None:
+        super().__init__(name, context, parameters)
+        self._row = 0
+        self._stamp_s: float | None = None
+        self._tick: int | None = None
 
     def update(self) -> Status:
+        inputs = self.context.board.inputs
         seen = self.context.board.visible_share
         wanted = self.context.scene.thresholds.roi_visibility
+        missed = self._tick is None or inputs.tick > self._tick + 1
+        self._tick = inputs.tick
         if seen is None or seen < wanted:
+            self._row, self._stamp_s = 0, None
             share = "unknown" if seen is None else f"{seen:.0%}"
             return self.fail(
                 Code.HIDDEN, f"{share} of the region is visible of {wanted:.0%} wanted"
+            )
+        stamp_s = inputs.observation.roi_visibility_stamp_s
+        if missed:
+            self._row = 1
+        elif stamp_s != self._stamp_s:
+            self._row += 1
+        self._stamp_s = stamp_s
+        if self._row < self.parameters.readings:
+            return self.fail(
+                Code.HIDDEN,
+                f"{seen:.0%} of the region is visible, so far in {self._row} of "
+                f"{self.parameters.readings} readings in a row",
             )
         return self.succeed(Code.VISIBLE, f"{seen:.0%} of the region is visible")
 

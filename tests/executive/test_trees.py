@@ -65,7 +65,7 @@ class TestNominal:
     def test_a_plan_is_carried_out_in_order_until_the_region_is_seen(self, stage):
         stage.until_doing("fold")
         stage.bench.world.visibility = 0.85
-        last = stage.tick()
+        last = stage.ticks(0.15)[-1]  # three readings confirm it
         assert stage.board.outcome == "goal"
         assert last.sent == HOLD
         assert doing(last) is None, "the fold was ticked beside the goal"
@@ -75,8 +75,15 @@ class TestNominal:
     def test_the_goal_counts_whenever_it_is_seen(self, stage):
         stage.until_doing("reach")
         stage.bench.world.visibility = 0.8
-        assert stage.tick().sent == HOLD
+        assert stage.ticks(0.15)[-1].sent == HOLD
         assert stage.board.outcome == "goal"
+
+    def test_one_false_reading_ends_nothing(self, stage):
+        stage.until_doing("pull")
+        for seen in (1.0, 0.0, 1.0, 1.0, 0.0):
+            stage.bench.world.visibility = seen
+            stage.tick()
+        assert stage.board.outcome is None
 
     def test_nothing_moves_before_monitoring_is_calibrated(self, monitored):
         first = monitored.until("calibrated", lambda r: monitored.board.rest_calibrated)
