@@ -6,6 +6,8 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from importlib.metadata import version
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -26,6 +28,12 @@ _SPOKEN = ("ExecutiveFailed", "RecordingFailed")
 """Errors whose message says it all; by name, because their modules are loaded only where needed."""
 
 
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"defras {version('defras')}")
+        raise typer.Exit
+
+
 def application(arguments: Sequence[str]) -> typer.Typer:
     """The command line as far as ``arguments`` need it.
 
@@ -40,9 +48,9 @@ def application(arguments: Sequence[str]) -> typer.Typer:
         pretty_exceptions_enable=False,
     )
     # A group keeps its name only beside another command, so the callback is there for all cases.
-    app.callback()(lambda: None)
+    app.callback()(_everywhere)
     asked = arguments[0] if arguments else ""
-    known = asked in (*COMMANDS, *GROUPS)
+    known = asked in (*COMMANDS, *GROUPS, "--version")
     for name in COMMANDS:
         if name == asked or not known:
             app.command(name)(getattr(import_module(f"defras_bt.cli.{name}"), name))
@@ -50,6 +58,17 @@ def application(arguments: Sequence[str]) -> typer.Typer:
         if name == asked or not known:
             app.add_typer(import_module(f"defras_bt.cli.{name}").app, name=name)
     return app
+
+
+def _everywhere(
+    tell_version: Annotated[
+        bool,
+        typer.Option(
+            "--version", is_eager=True, callback=_tell_version, help="Say which version this is."
+        ),
+    ] = False,
+) -> None:
+    """What may stand before every command."""
 
 
 def run_commands() -> None:

@@ -41,6 +41,19 @@ def folder_for(out: Path) -> Path:
         raise UserError(f"--out {out}: {error}; give a folder that can be written to") from error
 
 
+def require_folder(file: Path, option: str = "--out") -> None:
+    """See that the folder which ``file`` is to be written to is there, and can be written to.
+
+    Raises:
+        UserError: it is not; which of the folders above it is missing is said.
+    """
+    folder = file.absolute().parent
+    if not folder.exists():
+        missing = next(p for p in (*reversed(folder.parents), folder) if not p.exists())
+        raise UserError(f"{option} {file}: there is no folder {missing}; make it first")
+    folder_for(folder)
+
+
 def find_scene(named: str) -> tuple[Path, Scene]:
     """The scene file called ``named`` and what it says.
 

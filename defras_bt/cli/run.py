@@ -16,7 +16,7 @@ from defras_bt.cli.errors import OUTCOME_CODES, ExitCode, UserError
 from defras_bt.cli.files import find, find_scene, folder_for
 from defras_bt.cli.interrupts import Interrupts
 from defras_bt.cli.plan import rehearsed, tell
-from defras_bt.executive.deadline import interrupting
+from defras_bt.executive.deadline import LONGEST_RECOVERY_S, interrupting
 from defras_bt.executive.operation import WORLDS, Operation, operate
 from defras_bt.executive.operator_desk import OperatorDesk
 from defras_bt.executive.proof.prover import prove
@@ -36,8 +36,8 @@ from defras_bt.recording.summary import SummaryRecorder
 from defras_bt.recording.timeline import TimelineRecorder
 from defras_sim.scene import Scene
 
-# A tick that learns and rehearses takes up to minutes; a leaf caught in a loop takes for ever.
-LONGEST_TICK_S = 600.0
+LEFT = ("run.rrd", "recording.mcap", DECISIONS_FILE, "run.json", "report.html")
+"""The files that a run leaves in its folder."""
 
 
 def run(
@@ -51,6 +51,9 @@ def run(
         Path | None, typer.Option(help="Plan file of defras plan; default: rehearse now.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for what the run leaves.")] = None,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Give up what an earlier run left in --out.")
+    ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same run (model world).")] = 0,
     max_time: Annotated[float, typer.Option(min=1, help="Longest world time in s.")] = 300.0,
     substitute: Annotated[
@@ -88,7 +91,8 @@ def run(
     injected = NO_FAULTS
     if faults is not None:
         injected = read_faults(find(faults, "sim/faults"), believed.arms)
-    recorded = file_recorders(out) if out is not None else ()
+    if out is not None:
+        _require_unused(out, replace=replace)
     console = Console(soft_wrap=True, highlight=False)
     prepared = rehearsed(
         believed.for_bullet() if world == "bullet" else believed,
@@ -122,6 +126,7 @@ def run(
         console.print(
             f"A TRIAL, NOT AN OPERATION: faults are injected ({kinds}).", style="bold yellow"
         )
+    recorded = file_recorders(out) if out is not None else ()
     recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console), *recorded]
     desk = OperatorDesk(asks=approve, idle_s=believed.tick_s)
     interrupts = Interrupts(desk, last_deed=True)
@@ -132,7 +137,7 @@ def run(
                 recorders,
                 operator=desk,
                 faults=FaultInjection(injected, believed, seed),
-                deadline=interrupting(LONGEST_TICK_S),
+                deadline=interrupting(recovery_s=LONGEST_RECOVERY_S),
                 finishing=partial(_ended, desk, interrupts),
             )
     except KeyboardInterrupt:
@@ -144,9 +149,7 @@ def run(
         )
         raise typer.Exit(code_without_record(str(failed.summary.values["outcome"]))) from failed
     if out is not None:
-        console.print(
-            f"Written to {out}: run.rrd, recording.mcap, decisions.jsonl, run.json, report.html"
-        )
+        console.print(f"Written to {out}: {', '.join(LEFT)}")
     raise typer.Exit(OUTCOME_CODES[str(summary.values["outcome"])])
 
 
@@ -169,19 +172,38 @@ def code_without_record(outcome: str) -> ExitCode:
 
 
 def file_recorders(out: Path) -> list[Recorder]:
-    """The recorders that write what a run leaves, in ``out``.
+    """The recorders that write what a run leaves, in ``out``; what is there of that is removed.
 
     Raises:
         UserError: the folder cannot be made.
     """
     folder_for(out)
+    for name in LEFT:
+        (out / name).unlink(missing_ok=True)
+    timeline, bag, decisions, numbers, report = (out / name for name in LEFT)
     return [
-        TimelineRecorder(out / "run.rrd"),
-        BagRecorder(out / "recording.mcap"),
-        DecisionRecorder(out / DECISIONS_FILE),
-        SummaryRecorder(out / "run.json"),
-        ReportRecorder(out / "report.html"),
+        TimelineRecorder(timeline),
+        BagRecorder(bag),
+        DecisionRecorder(decisions),
+        SummaryRecorder(numbers),
+        ReportRecorder(report),
     ]
+
+
+def _require_unused(out: Path, *, replace: bool) -> None:
+    """See that nothing recorded is lost.
+
+    Raises:
+        UserError: the folder cannot be made, or holds what an earlier run left, which only
+            ``replace`` gives up.
+    """
+    folder_for(out)
+    there = [name for name in LEFT if (out / name).exists()]
+    if there and not replace:
+        raise UserError(
+            f"--out {out}: an earlier run left {', '.join(there)} there, which would be lost; give "
+            "another folder, or --replace to give them up"
+        )
 
 
 def _require_safe(tree: TreeSpec, named: str) -> None:

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 
 from defras_bt.cli.errors import UserError
-from defras_bt.cli.files import find_scene, folder_for
+from defras_bt.cli.files import find_scene, folder_for, require_folder
 from defras_sim.anatomy.building import built
 from defras_sim.anatomy.mesher import unknowns_of
 from defras_sim.anatomy.quality import qualities
@@ -139,7 +139,7 @@ def from_mesh(
     if not surface.is_file():
         raise UserError(f"there is no file {surface}")
     thickness_m = None if thickness is None else _length_m("--thickness", thickness)
-    folder_for(file.parent)
+    require_folder(file)
     try:
         with console.status("reading the surface") as status:
             sound = sound_surface(read_surface(surface, unit.value, up.value))

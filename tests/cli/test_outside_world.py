@@ -6,6 +6,7 @@ import io
 import signal
 import sys
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
@@ -67,6 +68,35 @@ def test_a_place_that_cannot_be_used(
     code, _, err = defras(*given)
     assert code == 2
     assert given[-1].removesuffix("/plan.json") in err.replace("\n", "")
+
+
+def test_the_version_is_told(defras: Defras) -> None:
+    code, out, _ = defras("--version")
+    assert code == 0
+    assert out == f"defras {version('defras')}\n"
+
+
+@pytest.mark.usefixtures("nothing_is_rehearsed")
+def test_what_an_earlier_run_left_is_not_lost(defras: Defras, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "notes.txt").write_text("mine")
+    (out / "recording.mcap").write_text("an hour of measuring")
+    code, _, err = defras("run", "demo", "--out", str(out))
+    assert code == 2
+    assert "an earlier run left recording.mcap there" in err.replace("\n", " ")
+    assert (out / "recording.mcap").read_text() == "an hour of measuring"
+
+
+def test_what_an_earlier_run_left_can_be_given_up(defras: Defras, tmp_path: Path) -> None:
+    scene, out = quick_scene(tmp_path, "quick"), tmp_path / "out"
+    out.mkdir()
+    for name in run_command.LEFT:
+        (out / name).write_text("old")
+    arguments = ("run", scene, "--tree", "fras", "--max-time", "1", "--out", str(out))
+    assert defras(*arguments)[0] == 2
+    defras(*arguments, "--replace")
+    assert all((out / name).read_bytes()[:3] != b"old" for name in run_command.LEFT)
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"", b"[]", b'{"schema": "other"}'])

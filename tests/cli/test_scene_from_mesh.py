@@ -17,6 +17,7 @@ def sheet_file(tmp_path_factory):
 
 def test_a_sheet_becomes_a_scene_that_can_be_checked_and_drawn(defras, sheet_file, tmp_path):
     out = tmp_path / "scenes" / "patient.yaml"
+    out.parent.mkdir()
     code, said, _ = defras(
         "scene", "from-mesh", str(sheet_file), "--unit", "mm", "--thickness", "5mm", "-o", str(out)
     )
@@ -34,6 +35,16 @@ def test_a_sheet_becomes_a_scene_that_can_be_checked_and_drawn(defras, sheet_fil
     code, _, error = defras("run", str(out), "--world", "bullet")
     assert code == 2
     assert "slabs only" in error
+
+
+def test_a_folder_that_is_not_there_is_named_and_not_made(defras, sheet_file, tmp_path):
+    out = tmp_path / "scenes" / "of_today" / "patient.yaml"
+    code, _, error = defras(
+        "scene", "from-mesh", str(sheet_file), "--unit", "mm", "--thickness", "5mm", "-o", str(out)
+    )
+    assert code == 2
+    assert f"there is no folder {tmp_path / 'scenes'}; make it first" in error.replace("\n", "")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -232,6 +233,21 @@ class TestLateTrees:
         assert all(still(record) for record in stage.notes.records)
         assert signal.getsignal(signal.SIGALRM) is before
         assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+    @pytest.mark.parametrize(("role", "returns"), [("motion", False), ("recovery", True)])
+    def test_only_a_recovery_may_take_longer(self, monkeypatch, role, returns):
+        def thinks(board):
+            end_s = time.monotonic() + 0.3
+            while time.monotonic() < end_s:
+                pass
+
+        monkeypatch.setattr("defras_bt.executive.deadline._AGAIN_S", 0.05)
+        stage = with_leaf(thinks, role, deadline=interrupting(0.05, recovery_s=60.0))
+        if returns:
+            assert stage.tick().sent == HOLD
+        else:
+            said = str(failure_of(stage))
+            assert "OperatorHolds 'operator_holds' did not return within 0.05 s" in said
 
     def test_a_limit_has_to_be_positive(self):
         with pytest.raises(ValueError, match="positive"):
