@@ -26,7 +26,12 @@ from defras_bt.planning.engine import (
 )
 from defras_bt.planning.english import plan_text
 from defras_bt.planning.journal import InvalidJournal, Journal
-from defras_bt.planning.plan_file import InvalidPlanFile, StalePlanFile, save_plan
+from defras_bt.planning.plan_file import (
+    InvalidPlanFile,
+    StalePlanFile,
+    UnusableThreshold,
+    save_plan,
+)
 from defras_bt.planning.preoperative import PreoperativeResult, preoperative_plans
 from defras_bt.planning.preparation import Preparation, prepare
 from defras_bt.planning.rehearsals import Progress as Report
@@ -109,7 +114,7 @@ def plan(
         if files:
             try:
                 save_plan(result, files[i])
-            except OSError as error:
+            except (OSError, UnusableThreshold) as error:
                 raise UserError(f"--out {out}: {error}") from error
             console.print(f"Written to {files[i]}", markup=False)
     if journal is not None:

@@ -44,6 +44,11 @@ class TickInputs:
     operator: OperatorState = NOBODY
     force_over_s: float = 0.0
 
+    @property
+    def force_over(self) -> bool:
+        """Whether the force is over its threshold, or either of them is not a number."""
+        return not self.force_n <= self.force_threshold_n
+
 
 @dataclass
 class Grip:

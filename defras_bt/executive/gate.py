@@ -91,7 +91,7 @@ class CommandGate:
             jaws = {n: ArmCommand(jaw_rad=_jaw(arm)) for n, arm in proposed.command.arms.items()}
             return GateVerdict(Command(jaws), tuple(bound))
         rate = proposed.rate
-        if not inputs.force_n <= inputs.force_threshold_n:
+        if inputs.force_over:
             rate = min(rate, RATE_OVER_FORCE)
         observed = inputs.observation.arms
         # A jaw that does not tell may hold tissue.

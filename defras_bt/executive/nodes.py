@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isnan
 from typing import Annotated, ClassVar
 
 from py_trees.common import Status
@@ -44,8 +45,9 @@ class AdaptRate(Task):
         reasons = []
         if (board.warning_state or 0) >= 1:
             reasons.append(f"warning state {board.warning_state}")
-        if board.inputs.force_n > board.inputs.force_threshold_n:
-            reasons.append(f"{board.inputs.force_n:.2f} N")
+        if board.inputs.force_over:
+            force_n = board.inputs.force_n
+            reasons.append("unknown force" if isnan(force_n) else f"{force_n:.2f} N")
         if not reasons:
             return self.succeed(Code.NOMINAL, "motion at full speed")
         board.rate = self.parameters.slow

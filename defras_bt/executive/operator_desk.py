@@ -125,11 +125,20 @@ class OperatorDesk:
             return DeskNotice(self._mode, question, self._plan_number, self._possible(), sentence)
 
     def close(self) -> None:
-        """The operation has its outcome: from now on nothing takes effect any more."""
+        """The operation has its outcome: from now on nothing takes effect any more.
+
+        What was asked for in its very last tick had no next tick to take effect in: that is said.
+        """
         with self._changed:
             self._closed = True
             self._question = None
+            late, self._acts = self._acts, []
             self._changed.notify_all()
+        for done in late:
+            self._tell(
+                f"Too late: the operation ended before it could heed {done.act.spoken} "
+                f"({done.source})."
+            )
         self._tell("The operation has ended.")
 
     def listen(self, listener: Listener) -> Callable[[], None]:

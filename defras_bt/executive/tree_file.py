@@ -20,8 +20,9 @@ Names joined from the root are paths ("defras/act"), so siblings have different 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,10 @@ from defras_bt.executive.tree_port_flow import unwritten_reads
 from defras_bt.executive.tree_ports import Wiring
 from defras_bt.executive.tree_spec import NodeSpec, Place, Scope, TreeSpec, Wire
 from defras_sim.yaml_source import Fault, InvalidFile, Location, YamlSource, read_yaml
+
+MOST_NODES = 10_000
+"""So many nodes a tree may have: files that include each other twice each grow without end."""
+FULL = "the tree has too many nodes"
 
 _DEEPEST = 64
 """Levels of nesting, includes counted; deeper is a mistake, and would exhaust Python's stack."""
@@ -58,7 +63,9 @@ def tree_from(
 ) -> TreeSpec:
     """As :func:`read_tree`, of a file that was read already, or of what another format says."""
     file, faults = source.file, list[Fault]()
-    tree = _Reader(source, faults, registry=registry, including=(file.resolve(),)).tree()
+    tree = _Reader(
+        source, faults, registry=registry, including=(file.resolve(),), count=count()
+    ).tree()
     if tree is not None and not faults:
         tree = Wiring(faults).wired(tree)
     if tree is not None and not faults:
@@ -77,9 +84,18 @@ class _Reader(FieldChecker):
 
     registry: Registry
     including: tuple[Path, ...]
+    count: Iterator[int]
+    """Counts the nodes of the whole tree, with those of its includes."""
+    sources: dict[Path, YamlSource] = field(default_factory=dict)
+    """The included files that were read already; shared, too."""
     depth: int = 0
     given: Mapping[str, Wire] | None = None
     included_at: Place | None = None
+
+    @property
+    def is_full(self) -> bool:
+        """Whether it was said already that the tree is too large."""
+        return any(fault.message.startswith(FULL) for fault in self.faults)
 
     def tree(self, called: str | None = None) -> TreeSpec | None:
         """The tree of this file, its topmost node ``called`` otherwise than the file says."""
@@ -105,6 +121,10 @@ class _Reader(FieldChecker):
         if depth > _DEEPEST:
             self.fault(at, f"nested deeper than {_DEEPEST} levels")
             return None
+        if next(self.count) >= MOST_NODES:
+            if not self.is_full:
+                self.fault(at, f"{FULL}: at most {MOST_NODES} are valid, includes counted")
+            return None
         if isinstance(data, str):
             kind: Any = data
             body: Any = {}
@@ -117,6 +137,7 @@ class _Reader(FieldChecker):
         known = (*KINDS, SUBTREE, *self.registry.nodes())
         if kind not in known:
             self.fault(at, f"there is no node {kind!r}{did_you_mean(str(kind), known)}")
+            self.look_below(at, body, depth)
             return None
         if body is None:
             self.fault(
@@ -204,6 +225,15 @@ class _Reader(FieldChecker):
                 lines[child.name] = self.place((*where, index))[1]
         return tuple(found.values())
 
+    def look_below(self, at: Location, body: Any, depth: int) -> None:
+        """Note what is wrong with whatever stands under a node of which nothing is known."""
+        held = body if isinstance(body, dict) else {}
+        children = held.get("children")
+        for index, item in enumerate(children if isinstance(children, list) else ()):
+            self.node((*at, "children", index), item, depth + 1)
+        if "child" in held:
+            self.node((*at, "child"), held["child"], depth + 1)
+
     def subtree(
         self, at: Location, body: Mapping[Any, Any], depth: int, called: str | None
     ) -> NodeSpec | None:
@@ -219,20 +249,25 @@ class _Reader(FieldChecker):
             hint = did_you_mean(options.file, beside)
             self.fault((*at, "file"), f"there is no file {options.file!r}{hint}")
             return None
+        if self.is_full:
+            return None
         if file.resolve() in self.including:
             chain = " -> ".join(path.name for path in (*self.including, file.resolve()))
             self.fault((*at, "file"), f"the file includes itself: {chain}")
             return None
         try:
-            source = read_yaml(file)
+            source = self.sources.get(file.resolve()) or read_yaml(file)
         except InvalidFile as error:
             self.faults.extend(error.faults)
             return None
+        self.sources[file.resolve()] = source
         tree = _Reader(
             source,
             self.faults,
             registry=self.registry,
             including=(*self.including, file.resolve()),
+            count=self.count,
+            sources=self.sources,
             depth=depth,
             given=wires,
             included_at=self.place(at),

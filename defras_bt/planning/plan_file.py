@@ -25,6 +25,10 @@ class InvalidPlanFile(ValueError):
     """The file cannot be read as a plan file."""
 
 
+class UnusableThreshold(ValueError):
+    """No force could be told from too much of it."""
+
+
 class StalePlanFile(ValueError):
     """The scene changed since the plan was made."""
 
@@ -36,7 +40,17 @@ class _PlanFile(BaseModel):
 
 
 def save_plan(result: PreoperativeResult, file: Path) -> None:
-    """Write ``result``; the folder must exist."""
+    """Write ``result``; the folder must exist.
+
+    Raises:
+        UnusableThreshold: the threshold that was computed is none that force checks could use.
+    """
+    objection = _objection(result.force_threshold_n)
+    if objection is not None:
+        raise UnusableThreshold(
+            f"the plan was not saved: {objection}. It is twice the median of the largest forces of "
+            "all rehearsals: state one in the scene (thresholds.force_n), or look at its material"
+        )
     content = _PlanFile(schema=SCHEMA, result=result)
     file.write_text(content.model_dump_json(by_alias=True, indent=1) + "\n", encoding="utf-8")
 
@@ -62,13 +76,23 @@ def read_plan(file: Path) -> PreoperativeResult:
             f"{file}: {place}: {first['msg']}; valid are files with schema {SCHEMA}, as "
             "`defras plan` writes them"
         ) from error
-    # Every force check of an operation compares with it: written so that NaN fails.
-    if not 0.0 < result.force_threshold_n <= HIGHEST_THRESHOLD_N:
-        raise InvalidPlanFile(
-            f"{file}: result.force_threshold_n is {result.force_threshold_n} N; valid is a force "
-            f"above 0 N and up to {HIGHEST_THRESHOLD_N:g} N"
-        )
+    objection = _objection(result.force_threshold_n)
+    if objection is not None:
+        raise InvalidPlanFile(f"{file}: result.{objection}")
     return result
+
+
+def _objection(threshold_n: float) -> str | None:
+    """What is wrong with a threshold; None where nothing is.
+
+    Every force check of an operation compares with it: written so that NaN fails.
+    """
+    if 0.0 < threshold_n <= HIGHEST_THRESHOLD_N:
+        return None
+    return (
+        f"force_threshold_n is {threshold_n} N; valid is a force above 0 N and up to "
+        f"{HIGHEST_THRESHOLD_N:g} N"
+    )
 
 
 def load_plan(file: Path, scene: Scene) -> PreoperativeResult:

@@ -71,7 +71,7 @@ class ProgressLine:
 
 def progress_line(record: TickRecord, info: RunInfo) -> Table:
     """The state of a run in one row."""
-    over = math.isfinite(record.force_n) and record.force_n > info.force_threshold_n
+    over = not record.force_n <= info.force_threshold_n  # as guards see it: unknown is over
     force = f"{record.force_n:.2f}" if math.isfinite(record.force_n) else "?"
     seen = record.observation.roi_visibility
     row = Table.grid(padding=(0, 2))

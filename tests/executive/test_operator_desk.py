@@ -50,6 +50,21 @@ def test_only_autonomy_permits_motion():
         assert (desk_in(mode).state().forbids is None) == (mode is Mode.AUTONOMOUS)
 
 
+def test_an_act_that_no_tick_heeds_any_more_is_told_to_be_too_late():
+    desk = OperatorDesk()
+    said = []
+    desk.listen(lambda notice: said.append(notice.sentence))
+    desk.request(Act.PAUSE, "terminal")
+    desk.state()
+    desk.request(Act.STOP, "socket")
+    desk.close()
+    assert said[-2:] == [
+        "Too late: the operation ended before it could heed stop (socket).",
+        "The operation has ended.",
+    ]
+    assert desk.state().acts == ()
+
+
 def test_what_was_taken_over_is_not_given_back_by_resuming():
     answer = desk_in(Mode.TAKEN_OVER).request(Act.RESUME, "another front end")
     assert answer.sentence == (

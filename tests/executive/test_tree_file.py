@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from defras_bt.executive.loader import build_tree
-from defras_bt.executive.tree_file import read_tree
+from defras_bt.executive.tree_file import MOST_NODES, read_tree
 from defras_bt.executive.tree_kinds import KINDS
 from defras_sim.yaml_source import InvalidFile
 
@@ -183,6 +183,37 @@ def test_a_loop_of_includes_is_shown(faults_of, write_tree):
     write_tree("name: b\ntree: {invert: {child: {subtree: {file: tree.yaml}}}}", "b.yaml")
     (fault,) = faults_of(in_tree("    - subtree: {file: a.yaml}"))
     assert fault.endswith("the file includes itself: tree.yaml -> a.yaml -> b.yaml -> tree.yaml")
+
+
+def test_what_stands_below_an_unknown_node_is_looked_at_too(faults_of):
+    said = faults_of(
+        """\
+name: t
+tree:
+  reactve:
+    children:
+      - Wach
+      - retri: {attempts: 1, child: {Limit: {limitt: 3}}}
+"""
+    )
+    assert [fault.split(":")[1] for fault in said] == ["3", "5", "6", "6", "6"]
+    assert "'Wach', did you mean" in said[1].replace("; ", ", ")
+    assert any("limitt" in fault for fault in said)
+
+
+def test_files_that_include_each_other_twice_each_are_refused_at_once(write_tree, toys):
+    levels = 40
+    for level in range(levels):
+        below = f"{{subtree: {{file: f{level + 1}.yaml, name: NAME}}}}"
+        twice = ", ".join(below.replace("NAME", name) for name in ("a", "b"))
+        write_tree(
+            f"name: f{level}\ntree: {{sequence: {{children: [{twice}]}}}}\n", f"f{level}.yaml"
+        )
+    write_tree("name: end\ntree: Think\n", f"f{levels}.yaml")
+    with pytest.raises(InvalidFile) as caught:
+        read_tree(write_tree("name: t\ntree: {subtree: {file: f0.yaml}}\n"), toys.registry)
+    (fault,) = caught.value.faults
+    assert f"at most {MOST_NODES} are valid" in fault.message
 
 
 def test_a_file_that_is_not_there(tmp_path, toys):

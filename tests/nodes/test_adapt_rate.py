@@ -20,6 +20,15 @@ def test_rate_by_state_and_force(bench, state, force_n, rate):
     assert node.code == ("nominal" if rate == 1.0 else "slowed")
 
 
+def test_a_force_that_nobody_knows_is_over_as_guards_see_it(bench):
+    bench.warn(0)
+    bench.says["force_n"] = float("nan")
+    node = bench.node(AdaptRate)
+    bench.tick(node)
+    assert bench.board.rate == 0.5
+    assert "unknown force" in node.feedback_message
+
+
 def test_the_rate_is_not_halved_again_every_tick(bench):
     bench.warn(1)
     node = bench.node(AdaptRate, slow=0.5)

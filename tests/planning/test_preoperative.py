@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from defras_bt.planning.engine import Engine
-from defras_bt.planning.plan_file import InvalidPlanFile, StalePlanFile, load_plan, save_plan
+from defras_bt.planning.plan_file import (
+    InvalidPlanFile,
+    StalePlanFile,
+    UnusableThreshold,
+    load_plan,
+    save_plan,
+)
 from defras_bt.planning.preoperative import (
     Execution,
     NothingToRetract,
@@ -144,6 +151,14 @@ def test_a_threshold_that_is_no_sensible_force_is_refused(small, rehearsed, tmp_
     assert file.read_text() != plain
     with pytest.raises(InvalidPlanFile, match=r"force_threshold_n is .*above 0 N and up to 50 N"):
         load_plan(file, small)
+
+
+@pytest.mark.parametrize("limit_n", [0.0, -1.0, 50.1, float("inf"), float("nan")])
+def test_a_threshold_that_could_not_be_read_again_is_not_saved(rehearsed, tmp_path, limit_n):
+    file = tmp_path / "plan.json"
+    with pytest.raises(UnusableThreshold, match=r"above 0 N and up to 50 N.*thresholds.force_n"):
+        save_plan(replace(rehearsed[0], force_threshold_n=limit_n), file)
+    assert not file.exists()
 
 
 def test_plan_file_round_trip(small, rehearsed, tmp_path):
