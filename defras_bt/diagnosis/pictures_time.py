@@ -18,7 +18,7 @@ from defras_bt.recording.palette import css
 from defras_sim.geometry import Floats
 
 MOST_TRAJECTORIES = 4
-_MOST_ROWS = 10
+MOST_ROWS = 6
 _MOST_LINES = 6
 """A sensor of more channels than this is shown by their root mean square."""
 _BEFORE, _AFTER = "#c24a3a", css(palette.ESTIMATED)
@@ -54,7 +54,21 @@ def rows(samples: Samples) -> tuple[Row, ...]:
             for i in members:
                 channel = samples.channels[i]
                 found.append(Row(channel.name, channel.unit, (i,), channel.noise_sd))
-    return tuple(sorted(found, key=lambda row: row.channels[0])[:_MOST_ROWS])
+    return tuple(sorted(found, key=lambda row: row.channels[0]))
+
+
+def striking_rows(diagnosis: Diagnosis) -> tuple[Row, ...]:
+    """Those of :func:`rows` in which the plain model is most off beside the noise, in order."""
+    samples, residual = diagnosis.samples, diagnosis.held_out_before
+
+    def off(row: Row) -> float:
+        seen = residual[np.isin(samples.channel, row.channels)]
+        seen = seen[np.isfinite(seen)]
+        return float(np.sqrt(np.mean(seen**2))) / max(row.noise_sd, 1e-12) if len(seen) else 0.0
+
+    found = rows(samples)
+    best = sorted(found, key=off, reverse=True)[:MOST_ROWS]
+    return tuple(row for row in found if row in best)
 
 
 def curve(samples: Samples, row: Row, trajectory: int, residual: Floats) -> tuple[Floats, Floats]:
@@ -77,10 +91,11 @@ def over_time_svg(diagnosis: Diagnosis, *, extended: bool) -> str:
         for index, name in enumerate(samples.trajectories)
         if np.any(samples.trajectory == index)
     ][:MOST_TRAJECTORIES]
-    lines = rows(samples)
+    lines = striking_rows(diagnosis)
     durations = [_duration_s(samples, index) for index, _ in shown]
     with matplotlib.rc_context(FIGURE_STYLE):
-        figure = Figure(figsize=(10.2, 1.25 * len(lines) + 0.9))
+        height = 1.25 * len(lines) + 1.1
+        figure = Figure(figsize=(10.2, height))
         axes = figure.subplots(
             len(lines),
             len(shown),
@@ -88,7 +103,12 @@ def over_time_svg(diagnosis: Diagnosis, *, extended: bool) -> str:
             sharex="col",
             sharey="row",
             width_ratios=[max(d, 0.15 * max(durations)) for d in durations],
-            gridspec_kw={"hspace": 0.16, "wspace": 0.04},
+            gridspec_kw={
+                "hspace": 0.16,
+                "wspace": 0.04,
+                "bottom": 0.75 / height,
+                "top": 1 - 0.35 / height,
+            },
         )
         for line, row in zip(axes, lines, strict=True):
             factor, unit = unit_shown(row.unit)
@@ -104,7 +124,7 @@ def over_time_svg(diagnosis: Diagnosis, *, extended: bool) -> str:
         for axis in axes[-1]:
             axis.set_xlabel("time [s]")
         handles, labels = axes[0][0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="lower center", ncols=3, bbox_to_anchor=(0.5, -0.005))
+        figure.legend(handles, labels, loc="lower center", ncols=3)
         figure.align_ylabels(list(axes[:, 0]))
         return svg_text(figure, "Difference between measurement and simulation over time")
 

@@ -15,7 +15,12 @@ from defras_bt.diagnosis.exhibits import Exhibits
 from defras_bt.diagnosis.pictures_curves import curves_svg
 from defras_bt.diagnosis.pictures_field import field_picture, percentile_m, worst_frame
 from defras_bt.diagnosis.pictures_ranking import confounding_svg, ranking_svg, shown_keys
-from defras_bt.diagnosis.pictures_time import MOST_TRAJECTORIES, over_time_svg
+from defras_bt.diagnosis.pictures_time import (
+    MOST_ROWS,
+    MOST_TRAJECTORIES,
+    over_time_svg,
+    rows,
+)
 from defras_bt.diagnosis.pictures_tissue import has_places, tissue_maps_svg
 from defras_bt.diagnosis.problem import Samples
 from defras_bt.diagnosis.report_words import (
@@ -123,6 +128,7 @@ def report_html(
             Markup(curves_svg(shown.comparisons, extended=extended)) if shown.comparisons else None
         ),
         over_time=Markup(over_time_svg(diagnosis, extended=extended)) if compared else None,
+        more_sensors=max(0, len(rows(diagnosis.samples)) - MOST_ROWS),
         more_recordings=max(0, len(diagnosis.samples.trajectories) - MOST_TRAJECTORIES),
         portrait=_portrait(diagnosis.portrait),
         portrait_after=_portrait(diagnosis.portrait_after) if extended else [],

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from defras_bt.diagnosis.diagnosis import Diagnosis
 from defras_bt.diagnosis.exhibits import Exhibits, ReplayFrame
-from defras_bt.diagnosis.pictures_time import Row, curve, phase_spans, rows
+from defras_bt.diagnosis.pictures_time import Row, curve, phase_spans, rows, striking_rows
 from defras_bt.diagnosis.report_words import unit_shown
 from defras_bt.diagnosis.timeline_blueprint import APPLICATION, Plot, blueprint
 from defras_bt.diagnosis.verdict_file import Origin
@@ -56,8 +56,9 @@ def write_timeline(
     stream.set_log_time_enabled(False)
     shown = exhibits or Exhibits()
     lines = rows(diagnosis.samples)
+    striking = striking_rows(diagnosis)
     extended = diagnosis.model != diagnosis.base
-    plots = [_plot(diagnosis, row) for row in lines]
+    plots = [_plot(diagnosis, row) for row in striking]
     layout = blueprint(plots, replay=bool(shown.replay), extended=extended)
     stream.save(drain.inlet, default_blueprint=layout)
     try:

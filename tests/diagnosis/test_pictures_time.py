@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from defras_bt.diagnosis.pictures_time import curve, phase_spans, rows
-from tests.diagnosis.synthetic_diagnosis import PHASES, samples
+from defras_bt.diagnosis.pictures_time import MOST_ROWS, curve, phase_spans, rows, striking_rows
+from tests.diagnosis.synthetic_diagnosis import PHASES, samples, synthetic_diagnosis
 
 
 def test_many_channels_share_a_row_and_few_have_their_own() -> None:
@@ -16,6 +16,37 @@ def test_many_channels_share_a_row_and_few_have_their_own() -> None:
     assert [row.name for row in found] == ["cloud", "force x", "force y", "force z"]
     assert [row.signed for row in found] == [False, True, True, True]
     assert found[0].noise_sd == 0.0003
+
+
+def test_of_many_rows_the_most_striking_are_drawn() -> None:
+    whole = synthetic_diagnosis()
+    named = [c for c in whole.samples.channels if c.sensor == "force"]
+    spare = tuple(replace(named[0], name=f"force {i}", sensor=f"spare {i}") for i in range(6))
+    count = len(whole.samples.channels)
+    channels = (*whole.samples.channels, *spare)
+    quiet = np.flatnonzero(whole.samples.channel == 0)
+    labels = replace(
+        whole.samples,
+        channels=channels,
+        **{
+            name: np.concatenate([getattr(whole.samples, name), *([values] * 6)])
+            for name in ("time_s", "trajectory", "phase", "fold")
+            for values in [getattr(whole.samples, name)[quiet]]
+        },
+        channel=np.concatenate(
+            [whole.samples.channel, *(np.full(len(quiet), count + i) for i in range(6))]
+        ),
+    )
+    still = np.zeros(6 * len(quiet))
+    busy = replace(
+        whole,
+        samples=labels,
+        held_out_before=np.concatenate([whole.held_out_before, still]),
+    )
+    assert len(rows(labels)) == 10
+    names = [row.name for row in striking_rows(busy)]
+    assert names[:4] == ["cloud", "force x", "force y", "force z"]
+    assert len(names) == MOST_ROWS
 
 
 def test_a_row_of_many_is_their_root_mean_square_without_what_was_not_seen() -> None:
