@@ -36,12 +36,12 @@ class ExtendedSnapshot:
 class ExtendedTissue:
     """The tissue of a scene with those effects of ``extension`` that act on tissue.
 
-    Without any it is the plain :class:`TissueModel`, bit by bit. ``model`` is for reading, and for
-    grasping and releasing; holes, solves and snapshots go through here.
+    Without any it is the plain :class:`TissueModel`, bit by bit. ``model`` is for reading; what
+    changes it goes through here.
 
     Example:
         >>> tissue = ExtendedTissue(scene, {"stress_relaxation": {"fraction": 0.3, "time_s": 2.0}})
-        >>> tissue.model.grasp("psm1", tip)
+        >>> tissue.grasp("psm1", tip)
         >>> state = tissue.solve({"psm1": tip}, time_s=0.0)
     """
 

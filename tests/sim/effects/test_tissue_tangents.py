@@ -76,6 +76,24 @@ def test_at_the_bounds_of_their_strengths_effects_end_finite(name: str) -> None:
         assert np.isfinite(state.grasp_forces_n[ARM]).all()
 
 
+def test_all_effects_together_find_an_equilibrium() -> None:
+    everything = {
+        **PRESENT,
+        "bed_adhesion": {"strength_pa": 30.0},
+        "gravity": {"acceleration_m_s2": 3.0},
+        "softening": {"share": 0.3},
+        "stress_relaxation": {"fraction": 0.3},
+    }
+    assert everything.keys() == EFFECTS.keys()
+    tissue = extended(everything)
+    state = retract(tissue, HALFWAY, RAISED, HALFWAY)
+    assert state.converged
+    net_n = sum(wrench.force_n for wrench in state.wrenches.values())
+    np.testing.assert_allclose(net_n, 0, atol=1e-4)
+    again = tissue.solve({ARM: HALFWAY}, 3.0)
+    np.testing.assert_allclose(again.nodes_m, state.nodes_m, atol=1e-4)
+
+
 def moved(name: str, values: Mapping[str, float]) -> ExtendedTissue:
     tissue = extended({name: values}, residual_share=1e-11)
     retract(tissue, HALFWAY, FOLDED, RAISED)
