@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from joblib import Parallel, delayed
 
+from defras_bt.diagnosis.noise import tolerances
 from defras_bt.diagnosis.problem import Candidate, Integers, Samples, Tangent
 from defras_bt.diagnosis.quality import DataQuality
 from defras_bt.diagnosis.recording import RecordedRun
@@ -96,7 +97,9 @@ class TissueProblem:
                     self.trajectories, self.assigned, frames, strict=True
                 )
             ]
-            found = TissueTangents(self.scene, whole, parts, self.candidates, self._jobs)
+            found = TissueTangents(
+                self.scene, whole, parts, self.candidates, tolerances(self.samples), self._jobs
+            )
             self._tangents = (key, found)
         return self._tangents[1].of(candidate)
 

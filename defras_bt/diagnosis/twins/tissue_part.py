@@ -67,6 +67,12 @@ class TissuePart:
         return self._layout.rows, len(self._trajectory.frames)
 
     @cached_property
+    def residual(self) -> Floats:
+        """Measured minus predicted (rows, frames)."""
+        camera = self._scene.depth_camera
+        return self._layout.residual(self._trajectory, self._assigned, self._frames, camera)
+
+    @cached_property
     def _points_m(self) -> list[Floats]:
         """Points of every frame where the model holds that they truly are."""
         return [self._frames.corrected(cloud.points_m) for cloud in self._assigned]

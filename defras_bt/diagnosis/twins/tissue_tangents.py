@@ -9,6 +9,7 @@ them. What cannot be differentiated is led along once with the effect and once w
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -29,6 +30,20 @@ _SLACK = {"joint_play": (1.0, 3.0)}
 _ONSET = {"grasp_slip": "time_s", "attachment_tear": "time_s"}
 """Effects that begin during the motion, and the parameter that says when."""
 _ONSETS = 7
+_STRONG = {"extra_attachment": 300.0, "missing_attachment": 1.0, "inclusion": 4.0}
+"""Effects of a place whose beginning says little of how they end: a soft spring under tissue that
+is lifted far pulls ever more, a firm one holds it. The strength at which they are tried in full, at
+the places that explain the residual best."""
+_PLACES_TRIED = 3
+
+
+@dataclass(frozen=True)
+class _Repeat:
+    """Keyframes of every trajectory, by a model with the effect at ``at`` plus ``step``."""
+
+    at: dict[str, float]
+    step: dict[str, float]
+    shapes: Sequence[Sequence[KeyShape | None]]
 
 
 class TissueTangents:
@@ -40,13 +55,17 @@ class TissueTangents:
         model: Extension,
         parts: Sequence[TissuePart],
         candidates: Sequence[Candidate],
+        tolerance: Floats,
         jobs: int,
     ) -> None:
+        """``tolerance`` (rows,): what is small in each row. ``jobs`` processes work at once."""
         self._scene, self._model, self._parts = scene, model, tuple(parts)
+        self._tolerance = tolerance
         self._effects = {c.effect.name: c.effect for c in candidates}
         self._shapes: list[KeyShapes] = []
-        self._others: dict[str, list[Sequence[KeyShape | None]]] = {}
-        self._lead_along(candidates, jobs)
+        self._repeats: dict[str, list[_Repeat]] = {}
+        self._lead_along(jobs)
+        self._try_in_full(candidates, jobs)
 
     def of(self, candidate: Candidate) -> tuple[Tangent, ...]:
         """All ways in which ``candidate`` could begin, or go on where the model has it."""
@@ -147,59 +166,74 @@ class TissueTangents:
                 yield Tangent({**at, onset: start}, steps, columns * begun[:, None])
 
     def _repeated(self, candidate: Candidate) -> Iterator[Tangent]:
-        others = self._others.get(candidate.key)
-        if others is None:
-            return
-        at = self._standing(candidate)
-        (p, *_) = [p for p in candidate.free if p.strength]
-        blocks = [
-            part.repeated(shapes.plain, other).ravel()
-            for part, shapes, other in zip(self._parts, self._shapes, others, strict=True)
-        ]
-        yield Tangent(at, ({p.name: _inwards(p, at[p.name])},), np.concatenate(blocks)[:, None])
+        for repeat in self._repeats.get(candidate.key, ()):
+            blocks = [
+                part.repeated(shapes.plain, other).ravel()
+                for part, shapes, other in zip(
+                    self._parts, self._shapes, repeat.shapes, strict=True
+                )
+            ]
+            yield Tangent(repeat.at, (repeat.step,), np.concatenate(blocks)[:, None])
 
-    def _lead_along(self, candidates: Sequence[Candidate], jobs: int) -> None:
-        """Run all passes that tangents need, side by side."""
+    def _lead_along(self, jobs: int) -> None:
+        """Lead the model along every trajectory: with derivatives, and with grips aside."""
         tissue = tuple(n for n, e in self._effects.items() if isinstance(e, TissueEffect))
         work: list[PassJob] = []
         for part in self._parts:
-            plain = PassJob(
-                self._scene, self._model, part.trajectory, part.keyframes.chosen, tissue
-            )
-            bare = PassJob(
-                self._scene, self._model, part.trajectory, part.keyframes.chosen, derivatives=False
-            )
-            work += [plain, *(_aside(bare, way) for way in ((ASIDE_M, 0.0), (0.0, ASIDE_M)))]
+            plain = self._job(part, self._model)
+            work.append(replace(plain, watched=tissue, derivatives=True))
+            work += [replace(plain, aside_m=way) for way in ((ASIDE_M, 0.0), (0.0, ASIDE_M))]
         found = _run(work, self._effects, jobs)
         self._shapes = [KeyShapes(*found[3 * i : 3 * i + 3]) for i in range(len(self._parts))]
-        undifferentiated = [
-            c
-            for c in candidates
-            if c.effect.name in tissue
-            and not any(
-                p[0] == c.effect.name
-                for shapes in self._shapes
-                for shape in shapes.plain
-                if shape is not None
-                for p in shape.places
-            )
-        ]
-        work = []
-        for candidate in undifferentiated:
-            at = self._standing(candidate)
+
+    def _try_in_full(self, candidates: Sequence[Candidate], jobs: int) -> None:
+        """Lead models along that have an effect which derivatives do not tell enough of."""
+        wanted: list[tuple[str, dict[str, float], dict[str, float]]] = []
+        work: list[PassJob] = []
+        for candidate in candidates:
+            if not isinstance(candidate.effect, TissueEffect):
+                continue
+            known = tuple(self._differentiated(candidate))
             (p, *_) = [p for p in candidate.free if p.strength]
-            values = {**at, p.name: at[p.name] + _inwards(p, at[p.name])}
-            changed = with_values(self._model, candidate.effect.name, values)
-            work += [
-                PassJob(
-                    self._scene, changed, part.trajectory, part.keyframes.chosen, derivatives=False
+            if not known:
+                begun = [self._standing(candidate)]
+                size = _inwards(p, begun[0][p.name])
+            elif candidate.effect.name in _STRONG and not self._has(candidate):
+                begun = [dict(tangent.at) for tangent in self._best(known)]
+                size = _STRONG[candidate.effect.name] - p.null
+            else:
+                continue
+            for at in begun:
+                changed = with_values(
+                    self._model, candidate.effect.name, {**at, p.name: at[p.name] + size}
                 )
-                for part in self._parts
-            ]
-        again = _run(work, self._effects, jobs)
+                wanted.append((candidate.key, at, {p.name: size}))
+                work += [self._job(part, changed) for part in self._parts]
+        found = _run(work, self._effects, jobs)
         count = len(self._parts)
-        for number, candidate in enumerate(undifferentiated):
-            self._others[candidate.key] = again[count * number : count * (number + 1)]
+        for number, (key, at, step) in enumerate(wanted):
+            shapes = found[count * number : count * (number + 1)]
+            self._repeats.setdefault(key, []).append(_Repeat(at, step, shapes))
+
+    def _best(self, tangents: Sequence[Tangent]) -> list[Tangent]:
+        """Those along which the residual would fall most."""
+        scale = self._joined(
+            [np.repeat(self._tolerance[:, None], part.shape[1], axis=1) for part in self._parts]
+        )
+        residual = np.nan_to_num(self._over_parts(lambda part, _: part.residual) / scale)
+
+        def gain(tangent: Tangent) -> float:
+            column = np.nan_to_num(tangent.columns[:, 0] / scale)
+            along = max(float(column @ residual), 0.0)
+            return along**2 / max(float(column @ column), 1e-12)
+
+        return sorted(tangents, key=gain, reverse=True)[:_PLACES_TRIED]
+
+    def _job(self, part: TissuePart, model: Extension) -> PassJob:
+        """``model`` led along the keyframes of ``part``, as it is."""
+        return PassJob(
+            self._scene, model, part.trajectory, part.keyframes.chosen, derivatives=False
+        )
 
     def _onsets_s(self) -> list[float]:
         """Times spread over all in which tissue is held."""
@@ -242,12 +276,6 @@ class TissueTangents:
 def _inwards(p: EffectParameter, value: float) -> float:
     """The parameter's step, turned round where it would leave the bounds."""
     return p.step if value + p.step <= p.upper else -p.step
-
-
-def _aside(job: PassJob, way_m: tuple[float, float]) -> PassJob:
-    return PassJob(
-        job.scene, job.model, job.trajectory, job.chosen, aside_m=way_m, derivatives=False
-    )
 
 
 def _run(
