@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from defras_bt.diagnosis.columns import Sketch, sketch
-from defras_bt.diagnosis.fitting import CountedProblem, Fit, begin, extend
+from defras_bt.diagnosis.fitting import Addition, CountedProblem, Fit, begin, extend
 from defras_bt.diagnosis.layout import layout
 from defras_bt.diagnosis.noise import Noise, estimate_noise
 from defras_bt.diagnosis.problem import Problem
@@ -61,9 +61,7 @@ def start_and_extend(
     return extend(
         search.counted,
         fit,
-        candidates.candidate(key),
-        option,
-        amplitudes,
+        [Addition(candidates.candidate(key), option, amplitudes)],
         noise,
         iterations=search.settings.iterations,
     )

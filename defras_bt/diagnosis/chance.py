@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from defras_bt.diagnosis.held_out import Products, products
+from defras_bt.diagnosis.held_out import Products, losses, products
 from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise_bias import KnownNoise, corrected
 from defras_bt.diagnosis.noise_search import Beside
 from defras_bt.diagnosis.problem import Samples
-from defras_bt.diagnosis.ranking import Board, remainder, score, whitened_products
+from defras_bt.diagnosis.ranking import Board, score, whitened_products
 from defras_bt.diagnosis.surrogates import surrogates
 from defras_sim.geometry import Floats
 
@@ -19,21 +19,29 @@ _REFITS = 20
 def known_noise(
     board: Board, beside: Beside, samples: Samples, found: Layout, rng: np.random.Generator
 ) -> KnownNoise:
-    """Noise that was estimated beside the best candidates, without the bias of having chosen and
-    removed them."""
+    """Noise that was estimated beside causes, without the bias of having removed them and of having
+    chosen the best."""
     noise = beside.noise
+    removed = [index for _, index in beside.columns_of(board)]
+    fixed = np.unique(np.concatenate([board.null(""), *removed[1:]]))
 
     def refit(drawn: Floats) -> Floats:
         inner = whitened_products(board, noise, drawn)
+        if not removed:
+            return np.asarray(drawn - board.columns[:, fixed] @ losses(inner, fixed).amplitudes)
         scores = score(board, inner)
         keys = list(scores.best)
         best = np.argmax([scores.statistic(key) for key in keys], axis=0)
         left = np.empty_like(drawn)
-        for column, index in enumerate(best):
-            key = keys[index]
-            one = inner.only(column)
-            option = int(scores.option[key][column])
-            left[:, column] = remainder(board, one, drawn[:, column], key, option)
+        for column, which in enumerate(best):
+            key = keys[which]
+            chosen = [own for _, own in board.of_option[key]]
+            index = fixed
+            if chosen:
+                option = int(scores.option[key][column])
+                index = np.unique(np.concatenate((fixed, chosen[option])))
+            amplitudes = losses(inner.only(column), index).amplitudes[:, 0]
+            left[:, column] = drawn[:, column] - board.columns[:, index] @ amplitudes
         return left
 
     return corrected(noise, beside.remainder, samples, found, refit, _REFITS, rng)
@@ -51,13 +59,12 @@ def surrogate_products(
 ) -> Products:
     """Inner products of whitened columns and ``count`` surrogates."""
     white = noise.middle.whiten(board.columns)
-    parts = []
+    parts: list[Products] = []
     shares = np.diff(np.linspace(0, count, len(noise.variants) + 1).astype(int))
     for variant, share in zip(noise.variants, shares, strict=True):
-        parts += [
-            products(white, noise.middle.whiten(drawn), board.fold)
-            for drawn in surrogates(variant, residual, int(share), rng)
-        ]
+        for drawn in surrogates(variant, residual, int(share), rng):
+            gram = parts[0].gram if parts else None
+            parts.append(products(white, noise.middle.whiten(drawn), board.fold, gram))
     return Products(
         parts[0].gram,
         np.concatenate([part.cross for part in parts], axis=2),

@@ -11,10 +11,12 @@ from defras_bt.diagnosis.beginning import begun, fitted_base
 from defras_bt.diagnosis.columns import sketch
 from defras_bt.diagnosis.confounding import confounding_of
 from defras_bt.diagnosis.diagnosis import Diagnosis
+from defras_bt.diagnosis.excess import removed_share
 from defras_bt.diagnosis.exclusion import exclusions
 from defras_bt.diagnosis.findings import Findings
 from defras_bt.diagnosis.fitting import (
     Fit,
+    bare,
     differentiate,
     refine,
 )
@@ -111,6 +113,8 @@ def _settle(found: Findings, told: Progress) -> None:
         _arrived(found)
     for key in search.accepted():
         found.rivals[key] = rivals(search, key, found.confounding, told)
+    told("what each cause gains", 0.6)
+    _measure_gains(found)
     told("what is left over", 0.7)
     left = search.held_out(search.fit, search.noise).residual
     found.left = left_over(
@@ -118,6 +122,21 @@ def _settle(found: Findings, told: Progress) -> None:
     )
     told("what is excluded", 0.8)
     found.excluded, found.unseen = exclusions(search)
+
+
+def _measure_gains(found: Findings) -> None:
+    """What would come back, held out, if a cause were taken out and the others re-tuned."""
+    search = found.search
+    before = search.held_out(found.base, search.noise).residual
+    whole = removed_share(
+        before, search.held_out(search.fit, search.noise).residual, search.samples
+    )
+    for key in search.accepted():
+        less = bare(search.counted, search.fit, key)
+        left = search.held_out(less, search.noise).residual
+        part = removed_share(before, left, search.samples)
+        if whole is not None and part is not None:
+            found.gains[key] = whole - part
 
 
 def _arrived(found: Findings) -> None:

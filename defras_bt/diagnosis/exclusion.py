@@ -22,7 +22,7 @@ def exclusions(search: Search) -> tuple[dict[str, Excluded], tuple[str, ...]]:
     now = board_of(search)
     if not now.of_option:
         return {}, ()
-    beside = noise_beside(search.fit.residual, now, search.samples, search.layout)
+    beside = noise_beside(search.fit.residual, now, search.samples, search.layout, search.removed)
     known = known_noise(now, beside, search.samples, search.layout, search.rng)
     filled = np.nan_to_num(search.fit.residual)[:, None]
     found = whitened_products(now, known.middle, filled)

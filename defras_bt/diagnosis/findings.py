@@ -20,6 +20,7 @@ def _nothing_known() -> Confounding:
 @dataclass
 class Findings:
     """``base``: the model with base parameters only. ``further``: gain by name of further data;
+    ``gains``: share of the first excess that is back without a cause;
     ``remarks``: sentences for the reader."""
 
     search: Search
@@ -27,6 +28,7 @@ class Findings:
     confounding: Confounding = field(default_factory=_nothing_known)
     rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     estimates: dict[str, dict[str, Estimate]] = field(default_factory=dict)
+    gains: dict[str, float] = field(default_factory=dict)
     excluded: dict[str, Excluded] = field(default_factory=dict)
     unseen: tuple[str, ...] = ()
     left: LeftOver = field(default_factory=lambda: LeftOver(()))

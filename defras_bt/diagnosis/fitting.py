@@ -7,7 +7,7 @@ where those do not name single parameters, and are kept current by Broyden's ran
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -69,7 +69,6 @@ class Fit:
     residual: Floats
     jacobian: Floats
     calls: int = 0
-    start: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -105,67 +104,79 @@ def begin(counted: CountedProblem, model: Extension) -> Fit:
     return Fit((), model, (), residual, np.zeros((len(residual), 0)))
 
 
+@dataclass(frozen=True)
+class Addition:
+    """A candidate to add to a fit, begun at ``amplitudes`` (k,) of one of its options."""
+
+    candidate: Candidate
+    option: Option
+    amplitudes: Floats
+
+    def values(self, share: float) -> dict[str, float]:
+        """Its parameters at a share of the amplitudes."""
+        return self.option.tangent.values(share * self.amplitudes, self.candidate.free)
+
+
 def extend(
     counted: CountedProblem,
     fit: Fit,
-    candidate: Candidate,
-    option: Option,
-    amplitudes: Floats,
+    additions: Sequence[Addition],
     noise: Noise,
     *,
     iterations: int,
 ) -> Fit | None:
-    """``fit`` with ``candidate`` added, all fitted together, begun at ``amplitudes`` (k,) of one
-    of its options; None where the twin can follow none of the models in its direction."""
+    """``fit`` with candidates added, all fitted together; None where the twin can follow none of
+    the models in their direction."""
     before = counted.calls
     for share in (1.0, 0.5, 0.25):
-        values = option.tangent.values(share * amplitudes, candidate.free)
-        start = added(fit.model, candidate, values)
+        start = fit.model
+        for one in additions:
+            start = added(start, one.candidate, one.values(share))
         residual = counted.residual(start)
         if np.isfinite(residual).any():
             break
     else:
         return None
-    free = fit.free + tuple((candidate.key, p) for p in candidate.free)
-    candidates = (*fit.candidates, candidate)
+    candidates = (*fit.candidates, *(one.candidate for one in additions))
+    free = fit.free + tuple((o.candidate.key, p) for o in additions for p in o.candidate.free)
     begun = Fit(candidates, start, free, residual, np.zeros((len(residual), 0)))
     known: list[Floats | None] = list(fit.jacobian.T)
-    known += _from_tangent(option, candidate.free)
-    jacobian = _jacobian(counted, begun, known)
-    begun = Fit(candidates, start, free, residual, jacobian, start={candidate.key: values})
+    for one in additions:
+        known += _from_tangent(one.option, one.candidate.free)
+    begun = replace(begun, jacobian=_jacobian(counted, begun, known))
     done = refine(counted, begun, noise, iterations=iterations)
-    return Fit(
-        candidates,
-        done.model,
-        free,
-        done.residual,
-        done.jacobian,
-        counted.calls - before,
-        begun.start,
-    )
+    return replace(done, calls=counted.calls - before)
 
 
 def without(counted: CountedProblem, fit: Fit, key: str, noise: Noise, *, iterations: int) -> Fit:
     """``fit`` with one of its candidates taken out and the others fitted anew."""
+    return refine(counted, bare(counted, fit, key), noise, iterations=iterations)
+
+
+def model_without(fit: Fit, key: str) -> Extension:
+    """The fitted model less one candidate's parameters."""
     gone = next(c for c in fit.candidates if c.key == key)
-    values = dict(fit.model[gone.effect.name])
     others = [c for c in fit.candidates if c.key != key]
+    values = dict(fit.model[gone.effect.name])
     for p in gone.effect.parameters:
         shared = any(c.effect is gone.effect for c in others)
         if p.name in values and (not shared or p in gone.free):
             del values[p.name]
     model = {name: v for name, v in fit.model.items() if name != gone.effect.name}
-    if values:
-        model[gone.effect.name] = values
+    return {**model, gone.effect.name: values} if values else model
+
+
+def bare(counted: CountedProblem, fit: Fit, key: str) -> Fit:
+    """``fit`` with one of its candidates taken out and the others left as they are."""
     keep = [i for i, (k, _) in enumerate(fit.free) if k != key]
-    begun = Fit(
-        tuple(others),
+    model = model_without(fit, key)
+    return Fit(
+        tuple(c for c in fit.candidates if c.key != key),
         model,
         tuple(fit.free[i] for i in keep),
         counted.residual(model),
         fit.jacobian[:, keep],
     )
-    return refine(counted, begun, noise, iterations=iterations)
 
 
 def refine(counted: CountedProblem, fit: Fit, noise: Noise, *, iterations: int) -> Fit:
@@ -203,9 +214,8 @@ def refine(counted: CountedProblem, fit: Fit, noise: Noise, *, iterations: int) 
         damping = damping / 10.0
         if gained < _SMALLEST_GAIN:
             break
-    return Fit(
-        fit.candidates, model, fit.free, residual, jacobian, counted.calls - before, fit.start
-    )
+    calls = counted.calls - before
+    return Fit(fit.candidates, model, fit.free, residual, jacobian, calls)
 
 
 def differentiate(counted: CountedProblem, fit: Fit, widths: Floats) -> Fit:

@@ -65,16 +65,22 @@ class Bounded:
     upper: float
 
 
-def products(columns: Floats, residuals: Floats, fold: Integers) -> Products:
-    """Of whitened ``columns`` (n, k) and ``residuals`` (n, s), which lie in folds (n,)."""
+def products(
+    columns: Floats, residuals: Floats, fold: Integers, gram: Floats | None = None
+) -> Products:
+    """Of whitened ``columns`` (n, k) and ``residuals`` (n, s), which lie in folds (n,); ``gram`` if
+    that of the columns is known."""
     folds = np.unique(fold)
-    gram = np.empty((len(folds), columns.shape[1], columns.shape[1]))
+    known = gram is not None
+    if gram is None:
+        gram = np.empty((len(folds), columns.shape[1], columns.shape[1]))
     cross = np.empty((len(folds), columns.shape[1], residuals.shape[1]))
     square = np.empty((len(folds), residuals.shape[1]))
     for index, one in enumerate(folds):
         rows = fold == one
         part, left = columns[rows], residuals[rows]
-        gram[index] = part.T @ part
+        if not known:
+            gram[index] = part.T @ part
         cross[index] = part.T @ left
         square[index] = np.einsum("ns,ns->s", left, left)
     return Products(gram, cross, square)

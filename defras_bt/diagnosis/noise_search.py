@@ -14,14 +14,23 @@ from itertools import combinations
 
 import numpy as np
 
+from defras_bt.diagnosis.columns import Option
 from defras_bt.diagnosis.held_out import Bounded, Products, losses, products
 from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise import ChannelNoise, Noise, estimate_noise
 from defras_bt.diagnosis.problem import Integers, Samples
-from defras_bt.diagnosis.ranking import Board, bounds_of, score, whitened_products
+from defras_bt.diagnosis.ranking import Board, alike, bounds_of, score, whitened_products
 from defras_sim.geometry import Floats
 
 _SHORT_LIST = 4
+_PAIRS = 2
+_MOST = 8
+_APART = 0.2
+"""Cosine below which two candidates have nothing to do with each other."""
+
+
+Chosen = tuple[tuple[str, int], ...]
+"""Candidates by key, each with the number of one of its options."""
 
 
 @dataclass(frozen=True)
@@ -31,30 +40,62 @@ class Beside:
 
     noise: Noise
     remainder: Floats
-    removed: tuple[str, ...]
+    removed: Chosen
+
+    def columns_of(self, board: Board) -> list[tuple[Option, Integers]]:
+        """What was removed, on a board."""
+        return [board.of_option[key][option] for key, option in self.removed]
 
 
-def noise_beside(residual: Floats, board: Board, samples: Samples, found: Layout) -> Beside:
-    """Noise beside the candidates of ``board`` that ``residual`` (n,) most likely holds."""
+def noise_beside(
+    residual: Floats, board: Board, samples: Samples, found: Layout, removed: Chosen = ()
+) -> Beside:
+    """Noise beside the candidates of ``board`` that ``residual`` (n,) most likely holds, added one
+    or two at a time to those that are known to be ``removed``."""
     first = estimate_noise(residual, samples, found)
-    tried = [_without(residual, board, samples, found, first, ())]
-    best = tried[0]
-    singles: dict[str, int] = {}
-    pairs: dict[tuple[tuple[str, int], ...], None] = {}
+    removed = tuple(one for one in removed if one[0] in board.of_option)
+    best = _without(residual, board, samples, found, first, removed)
+    for _ in range(_MOST):
+        noise, gone = best.noise, best.removed
+        tried = [
+            _without(residual, board, samples, found, noise, (*gone, *more))
+            for more in _promising(best, board)
+        ]
+        tried = sorted((one for one in tried if _cost(one) < _cost(best)), key=_cost)
+        if not tried:
+            break
+        best = tried[0]
+        # What else was good and concerns other numbers may come along.
+        inner = whitened_products(board, noise, np.nan_to_num(residual)[:, None])
+        more = best.removed
+        for one in tried[1:]:
+            new = one.removed[len(gone) :]
+            here = [key for key, _ in more]
+            if len(new) == 1 and all(alike(board, inner, new[0][0], k) < _APART for k in here):
+                more = (*more, *new)
+        if len(more) > len(best.removed):
+            both = _without(residual, board, samples, found, noise, more)
+            best = min(best, both, key=_cost)
+    return best
+
+
+def _promising(best: Beside, board: Board) -> list[Chosen]:
+    """Single candidates and pairs that explain most of a remainder."""
+    gone = {*board.nuisance, *(key for key, _ in best.removed)}
+    chosen: dict[Chosen, None] = {}
     for weighing in (best.noise, _white(best.noise)):
-        inner = whitened_products(board, weighing, np.nan_to_num(residual)[:, None])
+        inner = whitened_products(board, weighing, np.nan_to_num(best.remainder)[:, None])
         scores = score(board, inner)
         order = sorted(scores.best, key=lambda key: -float(scores.statistic(key)[0]))
-        order = [key for key in order if board.of_option[key]][:_SHORT_LIST]
+        order = [key for key in order if board.of_option[key] and key not in gone]
+        order = order[:_SHORT_LIST]
         for key in order:
-            singles.setdefault(key, int(scores.option[key][0]))
-        pairs |= dict.fromkeys(_pairs(board, inner, order))
-    for chosen in [*((single,) for single in singles.items()), *pairs]:
-        tried.append(_without(residual, board, samples, found, best.noise, chosen))
-    return min(tried, key=_cost)
+            chosen.setdefault(((key, int(scores.option[key][0])),))
+        chosen |= dict.fromkeys(_pairs(board, inner, order))
+    return list(chosen)
 
 
-def _pairs(board: Board, inner: Products, keys: Sequence[str]) -> list[tuple[tuple[str, int], ...]]:
+def _pairs(board: Board, inner: Products, keys: Sequence[str]) -> list[Chosen]:
     """The few pairs of ``keys`` that leave least, each with the options that do."""
     found = []
     for first, second in combinations(keys, 2):
@@ -68,7 +109,7 @@ def _pairs(board: Board, inner: Products, keys: Sequence[str]) -> list[tuple[tup
             for j, (_, other) in enumerate(board.of_option[second])
         ]
         found.append(min(choices))
-    return [chosen for _, chosen in sorted(found)[:_SHORT_LIST]]
+    return [chosen for _, chosen in sorted(found)[:_PAIRS]]
 
 
 def _nuisances(board: Board, without: Sequence[str]) -> list[Integers]:
@@ -81,7 +122,7 @@ def _without(
     samples: Samples,
     found: Layout,
     noise: Noise,
-    chosen: tuple[tuple[str, int], ...],
+    chosen: Chosen,
 ) -> Beside:
     """Nuisances and ``chosen`` options taken out, by weights that follow from the result."""
     index: list[Integers] = [board.always]
@@ -102,7 +143,7 @@ def _without(
         amplitudes = losses(inner, np.arange(len(columns)), bounds).amplitudes[:, 0]
         left = np.where(noise.seen, filled - part @ amplitudes, np.nan)
         noise = estimate_noise(left, samples, found)
-    return Beside(noise, left, tuple(keys))
+    return Beside(noise, left, chosen)
 
 
 def _cost(beside: Beside) -> float:

@@ -178,6 +178,25 @@ def ranked_pairs(board: Board, found: Products, best: Sequence[str]) -> tuple[Ra
     return tuple(sorted(rows, key=lambda row: -row.gain))
 
 
+def alike(board: Board, found: Products, first: str, second: str) -> float:
+    """Largest cosine between whitened columns of two candidates, the present model projected
+    out."""
+    gram = found.gram.sum(axis=0)
+    model = gram[np.ix_(board.always, board.always)] + np.eye(len(board.always))
+    one, other = (
+        np.concatenate([own for _, own in board.of_option[key]]) for key in (first, second)
+    )
+
+    def left(a: Integers, b: Integers) -> Floats:
+        across = gram[np.ix_(board.always, b)]
+        return np.asarray(
+            gram[np.ix_(a, b)] - gram[np.ix_(a, board.always)] @ np.linalg.solve(model, across)
+        )
+
+    sizes = np.sqrt(np.outer(np.diag(left(one, one)), np.diag(left(other, other))))
+    return float((np.abs(left(one, other)) / np.maximum(sizes, 1e-300)).max())
+
+
 def unseen(board: Board, found: Products) -> tuple[str, ...]:
     """Candidates none of whose options changes any number by an amount that could be seen."""
     gram = found.gram.sum(axis=0)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from defras_bt.diagnosis.fitting import extend, without
+from defras_bt.diagnosis.fitting import Addition, extend, without
 from defras_bt.diagnosis.noise import estimate_noise
 from defras_bt.diagnosis.ranking import board, remainder, score, start_of, whitened_products
 from defras_sim.geometry import Floats
@@ -49,9 +49,7 @@ def _begun_anew(search: Search, key: str) -> bool:
     again = extend(
         search.counted,
         bare,
-        search.sketch.candidate(key),
-        chosen,
-        amplitudes,
+        [Addition(search.sketch.candidate(key), chosen, amplitudes)],
         search.noise,
         iterations=search.settings.iterations,
     )

@@ -8,7 +8,7 @@ estimated anew in every round. At the end, causes that later ones made superfluo
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,19 +17,31 @@ from defras_bt.diagnosis.chance import known_noise, maxima
 from defras_bt.diagnosis.columns import Sketch
 from defras_bt.diagnosis.diagnosis import Ranked, RankedPair, Round, Trial
 from defras_bt.diagnosis.excess import is_practical
-from defras_bt.diagnosis.fitting import CountedProblem, Fit, conflicts, extend, walked, without
-from defras_bt.diagnosis.held_out import Products
+from defras_bt.diagnosis.fitting import (
+    Addition,
+    CountedProblem,
+    Fit,
+    bare,
+    conflicts,
+    extend,
+    walked,
+    without,
+)
+from defras_bt.diagnosis.held_out import Products, losses
 from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise import Noise, estimate_noise
 from defras_bt.diagnosis.noise_bias import KnownNoise
-from defras_bt.diagnosis.noise_search import noise_beside
+from defras_bt.diagnosis.noise_search import Beside, Chosen, noise_beside
 from defras_bt.diagnosis.predicted_folds import HeldOut, hold_out
 from defras_bt.diagnosis.problem import Samples
 from defras_bt.diagnosis.ranking import (
     Board,
+    alike,
     board,
+    bounds_of,
     ranked,
     ranked_pairs,
+    remainder,
     score,
     start_of,
     whitened_products,
@@ -41,7 +53,11 @@ from defras_sim.geometry import Floats
 _HOPELESS = 0.5
 """Of the threshold: candidates below it on the linearised model are not fitted."""
 _NOT_MUCH_WORSE = 0.3
-"""Of the best candidate's statistic: those below it are not fitted either."""
+"""Of the best rival's statistic: those below it are not fitted either."""
+_RIVALS = 0.3
+"""Cosine of what two candidates explain, from which on they are tried against each other."""
+_IN_A_CONTEST, _CONTESTS = 3, 4
+_FAR_ABOVE = 3.0
 
 _PASSES = 3
 """Over all candidates, where causes had to begin anew in between."""
@@ -64,6 +80,7 @@ class Search:
     fit: Fit
     noise: Noise
     fitted_with: Noise | None = None
+    removed: Chosen = ()
     fits: dict[str, dict[str, Fit]] = field(default_factory=dict)
     history: list[Fit] = field(default_factory=list)
     rounds: list[Round] = field(default_factory=list)
@@ -119,9 +136,11 @@ def _forward(search: Search, told: Progress) -> bool:
     number = len(search.rounds) + 1
     told(f"round {number}: ranking", 0.0)
     now = board_of(search)
-    beside = noise_beside(search.fit.residual, now, search.samples, search.layout)
+    residual = search.fit.residual
+    beside = noise_beside(residual, now, search.samples, search.layout, search.removed)
+    search.removed = beside.removed
     known = known_noise(now, beside, search.samples, search.layout, search.rng)
-    found = whitened_products(now, known.middle, np.nan_to_num(search.fit.residual)[:, None])
+    found = whitened_products(now, known.middle, np.nan_to_num(residual)[:, None])
     search.noise = known.middle
     rows = ranked(now, search.sketch, found)
     if not search.ranking:
@@ -129,30 +148,87 @@ def _forward(search: Search, told: Progress) -> bool:
         best = [row.key for row in rows[:12]]
         search.pairs = ranked_pairs(now, found, best)
     told(f"round {number}: what chance reaches", 0.2)
-    limit = _threshold(search, now, known, beside.remainder)
-    hopeful = _hopeful(search, _worth_naming(search, now, found, rows), limit)
-    trials, fits = [], {}
-    for index, row in enumerate(hopeful):
-        told(f"round {number}: fitting {row.key}", 0.3 + 0.7 * index / len(hopeful))
-        option = int(score(now, found).option[row.key][0])
-        chosen, amplitudes = start_of(now, found, row.key, option)
+    limit = _threshold(search, now, known, beside.remainder, rows[0].held_out)
+    if len(beside.removed) > 1 and accepted_together(search, now, found, beside, limit):
+        return True
+    groups = contests(now, found, _hopeful(search, _worth_naming(search, now, found, rows), limit))
+    accepted = False
+    for index, keys in enumerate(groups):
+        if index and len(search.accepted()) >= search.settings.causes:
+            break
+        told(f"round {number}: fitting {', '.join(keys)}", 0.3 + 0.7 * index / len(groups))
+        accepted |= _contest(search, now, found, keys, limit)
+    if not groups:
+        search.rounds.append(Round((), limit, None))
+    return accepted
+
+
+def accepted_together(
+    search: Search, now: Board, found: Products, beside: Beside, limit: float
+) -> bool:
+    """Try all causes at once that the noise was estimated beside; whether any was accepted.
+
+    Of causes that hide each other none is above chance alone. Each has to be so beside the others.
+    """
+    index = np.concatenate([now.null(""), *(own for _, own in beside.columns_of(now))])
+    bounds = tuple(b for option, own in beside.columns_of(now) for b in bounds_of(option, own))
+    left = losses(found, index, bounds).amplitudes[len(now.null("")) :, 0]
+    additions: list[Addition] = []
+    for (key, _), (option, own) in zip(beside.removed, beside.columns_of(now), strict=True):
+        candidate = search.sketch.candidate(key)
+        if not any(conflicts(candidate, one.candidate) for one in additions):
+            additions.append(Addition(candidate, option, left[: len(own)]))
+        left = left[len(own) :]
+    fit = extend(
+        search.counted, search.fit, additions, search.noise, iterations=search.settings.iterations
+    )
+    while fit is not None:
+        after = _noise_after(search, {"": fit}, search.noise)
+        trials = [_needed(search, fit, one.candidate.key, after) for one in additions]
+        weakest = min(trials, key=lambda t: t.held_out if t.practical else -np.inf)
+        if weakest.held_out > limit and weakest.practical:
+            break
+        additions = [one for one in additions if one.candidate.key != weakest.key]
+        if len(additions) < 2:
+            return False
+        fit = without(
+            search.counted, fit, weakest.key, after, iterations=search.settings.iterations
+        )
+    if fit is None:
+        return False
+    search.rounds += [Round((trial,), limit, trial.key) for trial in trials]
+    search.fit, search.noise = fit, after
+    search.history.append(fit)
+    return True
+
+
+def _needed(search: Search, fit: Fit, key: str, noise: Noise) -> Trial:
+    """How much worse a fit becomes without one of its causes, the others re-tuned."""
+    less = bare(search.counted, fit, key)
+    return _trial(search, key, fit, noise, less)
+
+
+def _contest(
+    search: Search, now: Board, found: Products, keys: tuple[str, ...], limit: float
+) -> bool:
+    """Fit rivals fully, each beside what is in the model; accept the best if it is good enough."""
+    fits: dict[str, Fit] = {}
+    for key in keys:
+        option = int(score(now, found).option[key][0])
+        chosen, amplitudes = start_of(now, found, key, option)
         fit = extend(
             search.counted,
             search.fit,
-            search.sketch.candidate(row.key),
-            chosen,
-            amplitudes,
-            known.middle,
+            [Addition(search.sketch.candidate(key), chosen, amplitudes)],
+            search.noise,
             iterations=search.settings.iterations,
         )
         if fit is not None:
-            fits[row.key] = fit
+            fits[key] = fit
     if not fits:
-        search.rounds.append(Round((), limit, None))
         return False
-    after = _noise_after(search, fits, known.middle)
-    for key, fit in fits.items():
-        trials.append(_trial(search, key, fit, after))
+    after = _noise_after(search, fits, search.noise)
+    trials = [_trial(search, key, fit, after) for key, fit in fits.items()]
     trials.sort(key=lambda trial: -trial.held_out)
     accepted = next((t for t in trials if t.held_out > limit and t.practical), None)
     search.rounds.append(Round(tuple(trials), limit, None if accepted is None else accepted.key))
@@ -167,7 +243,13 @@ def _forward(search: Search, told: Progress) -> bool:
     return True
 
 
-def _threshold(search: Search, now: Board, known: KnownNoise, left: Floats) -> float:
+def _threshold(
+    search: Search, now: Board, known: KnownNoise, left: Floats, largest: float
+) -> float:
+    """What chance reaches. It hardly changes from round to round, so it is measured anew only
+    where the best candidate is anywhere near it."""
+    if search.rounds and largest > _FAR_ABOVE * search.rounds[-1].threshold:
+        return search.rounds[-1].threshold
     chance = maxima(now, known, left, search.settings.surrogates, search.rng)
     return max(float(np.quantile(chance, 1.0 - search.settings.false_alarm)), 0.0)
 
@@ -185,23 +267,42 @@ def _worth_naming(
     for row in rows:
         if not row.visible:
             continue
-        chosen, amplitudes = start_of(now, found, row.key, int(scores.option[row.key][0]))
+        option = int(scores.option[row.key][0])
+        chosen, amplitudes = start_of(now, found, row.key, option)
         change = chosen.columns @ amplitudes
+        # The accepted causes make room for it, as they will when it is fitted.
+        without_it = remainder(now, found, residual, None)
+        with_it = remainder(now, found, residual, row.key, option)
         share = search.settings.relative_gain
-        if is_practical(change, residual, residual - change, search.samples, share):
+        if is_practical(change, without_it, with_it, search.samples, share):
             worth.append(row)
     return tuple(worth) or rows
 
 
 def _hopeful(search: Search, rows: tuple[Ranked, ...], limit: float) -> list[Ranked]:
-    """The few candidates worth a full fit: proper ones first, nuisances where no other is."""
+    """The candidates worth a full fit: proper ones first, nuisances where no other is. Where
+    several are above chance, those of no promise by themselves wait for the next round."""
     enough = [row for row in rows if row.visible and row.held_out > _HOPELESS * limit]
     proper = [row for row in enough if not search.sketch.candidate(row.key).nuisance]
     chosen = proper if any(row.held_out > limit for row in proper) else enough
-    if not chosen:
-        return []
-    best = chosen[0].held_out
-    return [r for r in chosen if r.held_out > _NOT_MUCH_WORSE * best][: search.settings.tried]
+    above = [row for row in chosen if row.held_out > limit]
+    return (above or chosen)[: 2 * search.settings.tried]
+
+
+def contests(now: Board, found: Products, rows: Sequence[Ranked]) -> list[tuple[str, ...]]:
+    """Groups of candidates that explain much the same, the best of each first.
+
+    Causes that have nothing to do with each other can be accepted in one round. Of a group, those
+    far behind the best are left out.
+    """
+    groups: list[list[Ranked]] = []
+    for row in rows:
+        home = next((g for g in groups if alike(now, found, g[0].key, row.key) > _RIVALS), None)
+        if home is None:
+            groups.append([row])
+        elif row.held_out > _NOT_MUCH_WORSE * home[0].held_out and len(home) < _IN_A_CONTEST:
+            home.append(row)
+    return [tuple(row.key for row in group) for group in groups[:_CONTESTS]]
 
 
 def _noise_after(search: Search, fits: dict[str, Fit], noise: Noise) -> Noise:
@@ -213,10 +314,12 @@ def _noise_after(search: Search, fits: dict[str, Fit], noise: Noise) -> Noise:
     return estimate_noise(left, search.samples, search.layout)
 
 
-def _trial(search: Search, key: str, fit: Fit, noise: Noise) -> Trial:
-    null, with_it = search.held_out(search.fit, noise, key), search.held_out(fit, noise, key)
+def _trial(search: Search, key: str, fit: Fit, noise: Noise, less: Fit | None = None) -> Trial:
+    """``fit`` beside the same without candidate ``key``, the present model if not ``less``."""
+    before = search.fit if less is None else less
+    null, with_it = search.held_out(before, noise, key), search.held_out(fit, noise, key)
     practical = is_practical(
-        search.fit.residual - fit.residual,
+        before.residual - fit.residual,
         null.residual,
         with_it.residual,
         search.samples,
@@ -230,7 +333,9 @@ def _backward(search: Search, told: Progress) -> None:
     changed = True
     while changed and len(search.accepted()) > 1:
         changed = False
-        for key in search.accepted()[:-1]:
+        # Causes that began anew stand last, whenever they were accepted.
+        newest = next((each.accepted for each in reversed(search.rounds) if each.accepted), None)
+        for key in (each for each in search.accepted() if each != newest):
             told(f"whether {key} is still needed", 0.5)
             less = without(
                 search.counted, search.fit, key, search.noise, iterations=search.settings.iterations

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from defras_bt.diagnosis.confounding import Confounding
-from defras_bt.diagnosis.fitting import Fit, conflicts, extend, without
+from defras_bt.diagnosis.fitting import Addition, Fit, conflicts, extend, without
 from defras_bt.diagnosis.held_out import losses, products
 from defras_bt.diagnosis.ranking import board, score, start_of, whitened_products
 from defras_bt.diagnosis.selection import Progress, Search
@@ -72,9 +72,7 @@ def _begun_from_ranking(search: Search, less: Fit, name: str, key: str) -> Fit |
     return extend(
         search.counted,
         less,
-        search.sketch.candidate(name),
-        option,
-        amplitudes,
+        [Addition(search.sketch.candidate(name), option, amplitudes)],
         search.noise,
         iterations=search.settings.iterations,
     )

@@ -124,22 +124,9 @@ def _cause(found: Findings, key: str) -> Cause:
         candidate.effect.name,
         candidate.site,
         estimates,
-        _gain_alone(found, key),
+        found.gains.get(key, 0.0),
         found.rivals.get(key, ()),
     )
-
-
-def _gain_alone(found: Findings, key: str) -> float:
-    """Share of the first excess that the step to ``key`` removed, held out."""
-    search = found.search
-    models = [found.base, *search.history]
-    residuals = [search.held_out(fit, search.noise).residual for fit in models]
-    for index in range(1, len(models)):
-        if key in models[index].keys and key not in models[index - 1].keys:
-            with_it = removed_share(residuals[0], residuals[index], search.samples)
-            before = removed_share(residuals[0], residuals[index - 1], search.samples)
-            return float((with_it or 0.0) - (before or 0.0))
-    return 0.0
 
 
 def _warnings(found: Findings, outside: bool) -> tuple[str, ...]:
