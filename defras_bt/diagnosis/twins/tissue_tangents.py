@@ -12,29 +12,24 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from defras_bt.diagnosis.problem import Candidate, Tangent
+from defras_bt.diagnosis.twins.tissue_beginnings import (
+    LATE_STEPS,
+    ONSET,
+    ONSETS,
+    PLACES_TRIED,
+    SLACK,
+    STRONG,
+    inwards,
+)
 from defras_bt.diagnosis.twins.tissue_part import ASIDE_M, KeyShapes, TissuePart, with_values
-from defras_bt.diagnosis.twins.tissue_pass import KeyShape, PassJob, run_pass
-from defras_sim.effects.effect import Effect, EffectParameter, Extension
+from defras_bt.diagnosis.twins.tissue_pass import KeyShape, PassJob
+from defras_bt.diagnosis.twins.tissue_passes import run_passes
+from defras_sim.effects.effect import Extension
 from defras_sim.effects.tissue_effect import TissueEffect
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
-from defras_sim.tissue.model import NothingToGrasp
-
-_LATE_STEPS = (1.0, 3.0)
-"""Of a delay's step: late frames are not on a straight line for long."""
-_SLACK = {"joint_play": (1.0, 3.0)}
-"""Effects without a derivative at their null point, and of how many steps of theirs to try."""
-_ONSET = {"grasp_slip": "time_s", "attachment_tear": "time_s"}
-"""Effects that begin during the motion, and the parameter that says when."""
-_ONSETS = 7
-_STRONG = {"extra_attachment": 300.0, "missing_attachment": 1.0, "inclusion": 4.0}
-"""Effects of a place whose beginning says little of how they end: a soft spring under tissue that
-is lifted far pulls ever more, a firm one holds it. The strength at which they are tried in full, at
-the places that explain the residual best."""
-_PLACES_TRIED = 3
 
 
 @dataclass(frozen=True)
@@ -95,7 +90,7 @@ class TissueTangents:
         for p in candidate.free:
             if not p.strength and not self._has(candidate):
                 continue
-            step = _inwards(p, at[p.name])
+            step = inwards(p, at[p.name])
             columns.append(change(candidate.effect.name, {**at, p.name: at[p.name] + step}))
             steps.append({p.name: step})
         return Tangent(at, tuple(steps), np.stack(columns, axis=1))
@@ -104,8 +99,8 @@ class TissueTangents:
         at = self._standing(candidate)
         effect = candidate.effect.name
         for p in candidate.free:
-            for times in _LATE_STEPS:
-                step = times * _inwards(p, at[p.name])
+            for times in LATE_STEPS:
+                step = times * inwards(p, at[p.name])
                 column = self._over_parts(lambda part, _, late_s=step: part.late(late_s))
                 yield Tangent(at, ({p.name: step},), column[:, None])
         if not candidate.free:
@@ -113,14 +108,14 @@ class TissueTangents:
 
     def _carried(self, candidate: Candidate) -> Iterator[Tangent]:
         name, at = candidate.effect.name, self._standing(candidate)
-        onset = _ONSET.get(name)
-        if self._has(candidate) or (onset is None and name not in _SLACK):
+        onset = ONSET.get(name)
+        if self._has(candidate) or (onset is None and name not in SLACK):
             yield self._smooth(candidate, self._carry)
             return
         (p, *_) = [p for p in candidate.free if p.strength]
         for start in self._onsets_s() if onset else (None,):
             begun = at if onset is None or start is None else {**at, onset: start}
-            for times in _SLACK.get(name, (1.0,)):
+            for times in SLACK.get(name, (1.0,)):
                 step = times * p.step
                 column = self._carry(name, {**begun, p.name: begun[p.name] + step})
                 yield Tangent(begun, ({p.name: step},), column[:, None])
@@ -147,12 +142,12 @@ class TissueTangents:
                 )
                 for parameter in parameters
             }
-            steps = tuple({name: _inwards(free[name], at[name])} for name in parameters)
+            steps = tuple({name: inwards(free[name], at[name])} for name in parameters)
             columns = np.stack(
                 [blocks[name] * step[name] for name, step in zip(parameters, steps, strict=True)],
                 axis=1,
             )
-            onset = _ONSET.get(effect.name)
+            onset = ONSET.get(effect.name)
             if onset is None or self._has(candidate):
                 yield Tangent(at, steps, columns)
                 continue
@@ -183,7 +178,7 @@ class TissueTangents:
             plain = self._job(part, self._model)
             work.append(replace(plain, watched=tissue, derivatives=True))
             work += [replace(plain, aside_m=way) for way in ((ASIDE_M, 0.0), (0.0, ASIDE_M))]
-        found = _run(work, self._effects, jobs)
+        found = run_passes(work, self._effects, jobs)
         self._shapes = [KeyShapes(*found[3 * i : 3 * i + 3]) for i in range(len(self._parts))]
 
     def _try_in_full(self, candidates: Sequence[Candidate], jobs: int) -> None:
@@ -197,10 +192,10 @@ class TissueTangents:
             (p, *_) = [p for p in candidate.free if p.strength]
             if not known:
                 begun = [self._standing(candidate)]
-                size = _inwards(p, begun[0][p.name])
-            elif candidate.effect.name in _STRONG and not self._has(candidate):
+                size = inwards(p, begun[0][p.name])
+            elif candidate.effect.name in STRONG and not self._has(candidate):
                 begun = [dict(tangent.at) for tangent in self._best(known)]
-                size = _STRONG[candidate.effect.name] - p.null
+                size = STRONG[candidate.effect.name] - p.null
             else:
                 continue
             for at in begun:
@@ -209,7 +204,7 @@ class TissueTangents:
                 )
                 wanted.append((candidate.key, at, {p.name: size}))
                 work += [self._job(part, changed) for part in self._parts]
-        found = _run(work, self._effects, jobs)
+        found = run_passes(work, self._effects, jobs)
         count = len(self._parts)
         for number, (key, at, step) in enumerate(wanted):
             shapes = found[count * number : count * (number + 1)]
@@ -227,7 +222,7 @@ class TissueTangents:
             along = max(float(column @ residual), 0.0)
             return along**2 / max(float(column @ column), 1e-12)
 
-        return sorted(tangents, key=gain, reverse=True)[:_PLACES_TRIED]
+        return sorted(tangents, key=gain, reverse=True)[:PLACES_TRIED]
 
     def _job(self, part: TissuePart, model: Extension) -> PassJob:
         """``model`` led along the keyframes of ``part``, as it is."""
@@ -245,7 +240,7 @@ class TissueTangents:
         times = np.sort(np.concatenate(held))
         if len(times) == 0:
             return []
-        at = np.linspace(0, len(times) - 1, _ONSETS + 2)[1:-1]
+        at = np.linspace(0, len(times) - 1, ONSETS + 2)[1:-1]
         return [float(times[int(i)]) for i in at]
 
     def _standing(self, candidate: Candidate) -> dict[str, float]:
@@ -271,25 +266,3 @@ class TissueTangents:
                 for part, block in zip(self._parts, blocks, strict=True)
             ]
         )
-
-
-def _inwards(p: EffectParameter, value: float) -> float:
-    """The parameter's step, turned round where it would leave the bounds."""
-    return p.step if value + p.step <= p.upper else -p.step
-
-
-def _run(
-    work: Sequence[PassJob], effects: Mapping[str, Effect], jobs: int
-) -> list[Sequence[KeyShape | None]]:
-    if jobs == 1 or len(work) <= 1:
-        return [_led(job, effects) for job in work]
-    led = Parallel(n_jobs=jobs, inner_max_num_threads=1)(delayed(_led)(j, effects) for j in work)
-    return list(led)
-
-
-def _led(job: PassJob, effects: Mapping[str, Effect]) -> Sequence[KeyShape | None]:
-    """A pass; where the model cannot take the tissue at all, it is unknown everywhere."""
-    try:
-        return run_pass(job, effects)
-    except (NothingToGrasp, ValueError):
-        return [None] * len(job.chosen)

@@ -1,0 +1,23 @@
+"""Where effects begin that are not there yet: how strong, since when, at how many places."""
+
+from __future__ import annotations
+
+from defras_sim.effects.effect import EffectParameter
+
+LATE_STEPS = (1.0, 3.0)
+"""Of a delay's step: late frames are not on a straight line for long."""
+SLACK = {"joint_play": (1.0, 3.0)}
+"""Effects without a derivative at their null point, and of how many steps of theirs to try."""
+ONSET = {"grasp_slip": "time_s", "attachment_tear": "time_s"}
+"""Effects that begin during the motion, and the parameter that says when."""
+ONSETS = 7
+STRONG = {"extra_attachment": 300.0, "missing_attachment": 1.0, "inclusion": 4.0}
+"""Effects of a place whose beginning says little of how they end: a soft spring under tissue that
+is lifted far pulls ever more, a firm one holds it. The strength at which they are tried in full, at
+the places that explain the residual best."""
+PLACES_TRIED = 3
+
+
+def inwards(p: EffectParameter, value: float) -> float:
+    """The parameter's step, turned round where it would leave the bounds."""
+    return p.step if value + p.step <= p.upper else -p.step
