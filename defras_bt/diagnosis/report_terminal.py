@@ -14,6 +14,7 @@ from defras_bt.diagnosis.report_words import (
     estimate_words,
     excluded_words,
     key_words,
+    readable,
     share_words,
     spoken,
     verdict_sentence,
@@ -38,7 +39,7 @@ def print_diagnosis(console: Console, diagnosis: Diagnosis, effects: Iterable[Ef
     if verdict.verdict != "nothing":
         console.print(_gain(verdict), markup=False, highlight=False)
     for warning in verdict.warnings:
-        console.print(Text(warning, style="yellow"))
+        console.print(Text(readable(warning, known), style="yellow"))
     if verdict.excluded:
         told = [excluded_words(key, each) for key, each in verdict.excluded.items()]
         more = len(told) - _MOST_EXCLUDED

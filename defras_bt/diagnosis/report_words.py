@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 
 from defras_bt.diagnosis.verdict import Cause, Estimate, Excluded, Verdict
 from defras_sim.effects.effect import Effect
@@ -23,6 +24,7 @@ _SCALED: dict[str, tuple[float, str]] = {
 }
 _PURE = ("", "1", "rad/rad", "m/m")
 _DIGITS = 3
+_KEY = re.compile(r"\b([a-z]+(?:_[a-z]+)*)(?:@[a-z0-9]+(?:(?:<-|,)[a-z0-9]+)*)?")
 
 
 def key_words(key: str) -> str:
@@ -30,6 +32,15 @@ def key_words(key: str) -> str:
     effect, _, site = key.partition("@")
     name = effect.replace("_", " ")
     return f"{name} ({site})" if site else name
+
+
+def readable(text: str, effects: Collection[str]) -> str:
+    """``text`` with keys of ``effects`` in it as words."""
+
+    def words(found: re.Match[str]) -> str:
+        return key_words(found[0]) if found[1] in effects else found[0]
+
+    return _KEY.sub(words, text)
 
 
 def quantity(value: float, unit: str) -> str:

@@ -131,6 +131,15 @@ def test_nothing_and_outside_have_their_own_pages() -> None:
     assert "90 % of the error stays unexplained" in said
 
 
+def test_what_explains_a_part_is_drawn_but_not_adopted() -> None:
+    outside = replace(named_verdict(), verdict="outside", causes=(), unexplained_share=0.5)
+    model = {"grasp_slip": {"distance_m": 0.01}}
+    partly = replace(synthetic_diagnosis(outside), model=model, partial=("grasp_slip",))
+    said = page(partly)
+    assert "has in it what explains a part: grasp slip. Nothing of it is adopted." in said
+    assert "extended simulation" in said
+
+
 def test_a_loss_is_shown_as_one() -> None:
     lost = replace(named_verdict(), gain=Gain(in_range=0.4, beyond_range=-0.25))
     assert re.search(

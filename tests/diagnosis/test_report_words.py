@@ -13,6 +13,7 @@ from defras_bt.diagnosis.report_words import (
     joined,
     key_words,
     quantity,
+    readable,
     spoken,
     verdict_sentence,
 )
@@ -68,6 +69,13 @@ def test_names_are_words() -> None:
     assert either(["a"]) == "a"
     assert either(["a", "b", "c"]) == "a, b or c"
     assert joined(["a", "b"]) == "a and b"
+
+
+def test_keys_within_sentences_become_words() -> None:
+    said = "A part looks like joint_play@q6, joint_coupling@q6<-q4,q5,q6, servo_lag, not of_this."
+    assert readable(said, {"joint_play", "joint_coupling", "servo_lag"}) == (
+        "A part looks like joint play (q6), joint coupling (q6<-q4,q5,q6), servo lag, not of_this."
+    )
 
 
 def test_a_named_cause_is_told_with_its_meaning_and_its_gain() -> None:
