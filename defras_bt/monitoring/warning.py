@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import deque
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 
@@ -38,10 +39,11 @@ class WarningMonitor:
         self._tracks = {
             metric.name: MetricTrack(scene.thresholds.delta_m) for metric in self._metrics
         }
-        self._can_wait: Collection[str] = ()
+        self._can_wait: Set[str] = set()
         self._waiting: tuple[PointCloud, SeenSurface] | None = None
         self._caught_up_s = -np.inf
         self._rest_stamp_s = -np.inf
+        self._resting: tuple[PointCloud, SeenSurface, Set[str]] | None = None
         self._surfaces: deque[tuple[float, Surface]] = deque()
         self._last: MonitorReading | None = None
         self._seen: tuple[Surface, SeenSurface] | None = None
@@ -64,18 +66,32 @@ class WarningMonitor:
     def observe_rest(self, cloud: PointCloud | None, surface: Surface) -> bool:
         """Learn what the metrics say at rest; True once there is enough to calibrate.
 
-        A missing cloud and a cloud seen before teach nothing.
+        A missing cloud and a cloud seen before teach nothing, but leave time for metrics that had
+        to wait.
         """
         if cloud is not None and cloud.stamp_s > self._rest_stamp_s:
             self._rest_stamp_s = cloud.stamp_s
-            seen = self._seen_of(surface)
-            for metric in self._metrics:
+            self._rest(self._resting)
+            frame = cloud, self._seen_of(surface)
+            self._resting = (*frame, self._can_wait) if self._can_wait else None
+            self._rest((*frame, set(self._tracks) - self._can_wait))
+        elif self._resting is not None:
+            self._rest(self._resting)
+            self._resting = None
+        return bool(self.calibration)
+
+    def _rest(self, frame: tuple[PointCloud, SeenSurface, Set[str]] | None) -> None:
+        """Let metrics of these names learn what they say of a frame at rest."""
+        if frame is None:
+            return
+        cloud, seen, names = frame
+        for metric in self._metrics:
+            if metric.name in names:
                 value_m = metric.measure(cloud.points_m, seen).value_m
                 self._tracks[metric.name].rest(value_m)
-            if all(track.rested for track in self._tracks.values()):
-                for track in self._tracks.values():
-                    track.calibrate()
-        return bool(self.calibration)
+        if all(track.rested for track in self._tracks.values()):
+            for track in self._tracks.values():
+                track.calibrate()
 
     def reading(self, cloud: PointCloud | None, surface: Surface, time_s: float) -> MonitorReading:
         """What monitoring says now; ``surface`` is the twin's at ``time_s``.
@@ -166,8 +182,8 @@ class WarningMonitor:
 
         At the speed with tissue, the current surface would be off by up to 1.5 mm.
         """
-        times = np.array([time for time, _ in self._surfaces])
-        after = int(np.searchsorted(times, stamp_s))
+        times = [time for time, _ in self._surfaces]
+        after = bisect_left(times, stamp_s)
         if after == 0 or after == len(times):
             return self._surfaces[min(after, len(times) - 1)][1]
         (start, before), (end, then) = self._surfaces[after - 1], self._surfaces[after]

@@ -200,6 +200,19 @@ class TestMetricsThatCanWait:
             assert late.warning_state["median"] == same.warning_state["median"]
         assert at_once[-1].warning_state == {"local": 3, "median": 3}
 
+    def test_rest_is_learned_as_well_one_tick_later(
+        self, slab: Slab, take_cloud: Take, scene: Scene
+    ) -> None:
+        eager, patient = WarningMonitor(scene), WarningMonitor(scene)
+        patient.listen_to("local")
+        ready: dict[WarningMonitor, list[bool]] = {eager: [], patient: []}
+        for tick in range(12):
+            cloud = PointCloud(0.1 * (tick // 2), take_cloud(slab(), tick // 2))
+            for monitor, said in ready.items():
+                said.append(monitor.observe_rest(cloud, slab()))
+        assert [said.index(True) for said in ready.values()] == [8, 9]
+        assert str(patient.calibration) == str(eager.calibration)
+
     def test_they_are_heard_once_a_second_where_every_tick_brings_a_cloud(
         self, rested: WarningMonitor, slab: Slab, take_cloud: Take
     ) -> None:
