@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import ClassVar, Literal
 
-import numpy as np
 from py_trees.common import Status
 
 from defras_bt.executive.node import Node, NodeParameters, Role
@@ -63,7 +63,7 @@ class ArmAction(Node):
     def go(self, target_m: Floats, speed_m_s: float) -> bool:
         """Propose motion straight to ``target_m``; True once the set-point is there."""
         way = target_m - self.setpoint_m
-        distance = float(np.linalg.norm(way))
+        distance = hypot(*way.tolist())
         if distance <= ARRIVED_M:
             return True
         speed = min(speed_m_s, distance / self.context.scene.tick_s)

@@ -2,8 +2,9 @@
 
 Everything but world, twin and drawing counts: checks of readings, monitoring, the tree with its
 reasons, the gate, and in a second run the recording. World and twin are stand-ins that cost next to
-nothing, and what they cost is subtracted; the cloud and the twin's surface have the size of real
-ones and change all the time, so that sensing and monitoring do what they do in an operation.
+nothing, and what they cost is subtracted. The tissue hangs from a jaw that lifted it, and breathes:
+cloud and twin's surface have the size and the shape of real ones and change all the time, so that
+sensing and monitoring do what they do in an operation.
 """
 
 from __future__ import annotations
@@ -37,12 +38,14 @@ from defras_sim.camera.ray_caster import RayCaster
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
+from defras_sim.tissue.model import TissueModel
 from defras_sim.tissue.state import TissueState
 from defras_sim.twin import Twin
 from defras_sim.worlds.protocol import Command, Observation, PointCloud
 
 BARE = "bare py_trees"
 _BREATH_M = 1e-4
+_LIFT_M = 0.03
 _CYCLE = ("reach", "open", "grasp", "pull", "move", "fold", "release")
 _POINTS: tuple[GridPoint, ...] = ((2, 4), (2, 5), (3, 4), (3, 5), (1, 4))
 
@@ -224,7 +227,7 @@ class _TimedWorld(BenchWorld):
 
 
 class _TimedTwin(Twin):
-    """A twin whose tissue breathes a little, whatever is done to it.
+    """A twin whose lifted tissue breathes a little, whatever is done to it.
 
     So no tick finds the surface of the one before, as while tissue is held.
     """
@@ -232,6 +235,12 @@ class _TimedTwin(Twin):
     def __init__(self, scene: Scene, watch: Stopwatch) -> None:
         super().__init__(scene)
         self._watch = watch
+        self._lifted = _lifted(scene)
+
+    @property
+    def state(self) -> TissueState:
+        """The same at all times but for its breath."""
+        return self._lifted
 
     def grasp(self, arm: str, tissue_from_tip: Pose, time_s: float | None = None) -> None:
         pass
@@ -244,6 +253,16 @@ class _TimedTwin(Twin):
             surface = self.state.surface
             risen_m = surface.vertices_m + [0.0, 0.0, _BREATH_M * np.sin(time_s)]
             return replace(self.state, surface=replace(surface, vertices_m=risen_m))
+
+
+def _lifted(scene: Scene) -> TissueState:
+    """Tissue that is held at the first point of the plan, well above where it lay."""
+    tissue = TissueModel(scene)
+    grasp = Pose(scene.grasp_point_m(*_POINTS[0]))
+    tissue.grasp("psm1", grasp)
+    for share in np.linspace(0.1, 1.0, 10):
+        state = tissue.solve({"psm1": grasp.moved(np.array([0.0, 0.0, share * _LIFT_M]))})
+    return state
 
 
 class _TimedMonitor(WarningMonitor):

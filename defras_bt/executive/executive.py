@@ -25,6 +25,7 @@ from defras_bt.executive.tree_file import read_tree
 from defras_bt.executive.why import WhyTeller
 from defras_bt.recording.operator_state import UNATTENDED, Operator
 from defras_bt.recording.record import Event, Recorder, TickRecord
+from defras_sim.surface import Surface
 from defras_sim.worlds.protocol import HOLD, Command, World
 
 # So long a tree may want motion that the gate refuses before a human is asked.
@@ -241,16 +242,19 @@ class Executive:
             self._board.end("human", why, Code.MOTION_REFUSED)
 
     def _record(self, inputs: TickInputs, sent: Command) -> None:
-        true_force_n, true_surface = self._world.true_force_n(), self._world.true_surface()
-        known = self._known(inputs, sent)
+        truth = self._world.true_force_n(), self._world.true_surface()
+        known = self._known(inputs, sent, *truth)
         why = self._why.event(known, self.tree.kinds)
-        events = known.events if why is None else (*known.events, why)
-        self.last = replace(
-            known, true_force_n=true_force_n, true_surface=true_surface, events=events
-        )
+        self.last = known if why is None else replace(known, events=(*known.events, why))
         self._recorder.tick(self.last)
 
-    def _known(self, inputs: TickInputs, sent: Command) -> TickRecord:
+    def _known(
+        self,
+        inputs: TickInputs,
+        sent: Command,
+        true_force_n: float | None = None,
+        true_surface: Surface | None = None,
+    ) -> TickRecord:
         """The tick as the executive knows it; what is true only the world knows."""
         board, slot = self._board, self.tree.plan_slot
         snapshot = self._ticked.snapshot()
@@ -261,8 +265,8 @@ class Executive:
             twin=inputs.twin,
             reading=inputs.reading,
             force_n=inputs.force_n,
-            true_force_n=None,
-            true_surface=None,
+            true_force_n=true_force_n,
+            true_surface=true_surface,
             rate=board.rate,
             proposed=board.command,
             sent=sent,
