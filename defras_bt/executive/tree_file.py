@@ -20,9 +20,8 @@ Names joined from the root are paths ("defras/act"), so siblings have different 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -31,15 +30,12 @@ from defras_bt.executive.registry import NODES, Registry, did_you_mean, snake_ca
 from defras_bt.executive.tree_check import check_tree
 from defras_bt.executive.tree_fields import FieldChecker
 from defras_bt.executive.tree_header import SUBTREE, SubtreeOptions, TreeHeader
+from defras_bt.executive.tree_includes import TreeIncludes
 from defras_bt.executive.tree_kinds import KINDS, Kind
 from defras_bt.executive.tree_port_flow import unwritten_reads
 from defras_bt.executive.tree_ports import Wiring
 from defras_bt.executive.tree_spec import NodeSpec, Place, Scope, TreeSpec, Wire
 from defras_sim.yaml_source import Fault, InvalidFile, Location, YamlSource, read_yaml
-
-MOST_NODES = 10_000
-"""So many nodes a tree may have: files that include each other twice each grow without end."""
-FULL = "the tree has too many nodes"
 
 _DEEPEST = 64
 """Levels of nesting, includes counted; deeper is a mistake, and would exhaust Python's stack."""
@@ -63,9 +59,7 @@ def tree_from(
 ) -> TreeSpec:
     """As :func:`read_tree`, of a file that was read already, or of what another format says."""
     file, faults = source.file, list[Fault]()
-    tree = _Reader(
-        source, faults, registry=registry, including=(file.resolve(),), count=count()
-    ).tree()
+    tree = _Reader(source, faults, registry=registry, including=(file.resolve(),)).tree()
     if tree is not None and not faults:
         tree = Wiring(faults).wired(tree)
     if tree is not None and not faults:
@@ -84,18 +78,10 @@ class _Reader(FieldChecker):
 
     registry: Registry
     including: tuple[Path, ...]
-    count: Iterator[int]
-    """Counts the nodes of the whole tree, with those of its includes."""
-    sources: dict[Path, YamlSource] = field(default_factory=dict)
-    """The included files that were read already; shared, too."""
+    includes: TreeIncludes = field(default_factory=TreeIncludes)
     depth: int = 0
     given: Mapping[str, Wire] | None = None
     included_at: Place | None = None
-
-    @property
-    def is_full(self) -> bool:
-        """Whether it was said already that the tree is too large."""
-        return any(fault.message.startswith(FULL) for fault in self.faults)
 
     def tree(self, called: str | None = None) -> TreeSpec | None:
         """The tree of this file, its topmost node ``called`` otherwise than the file says."""
@@ -121,9 +107,9 @@ class _Reader(FieldChecker):
         if depth > _DEEPEST:
             self.fault(at, f"nested deeper than {_DEEPEST} levels")
             return None
-        if next(self.count) >= MOST_NODES:
-            if not self.is_full:
-                self.fault(at, f"{FULL}: at most {MOST_NODES} are valid, includes counted")
+        if (too_many := self.includes.count()) is not None:
+            self.fault(at, too_many)
+        if self.includes.full:
             return None
         if isinstance(data, str):
             kind: Any = data
@@ -249,25 +235,21 @@ class _Reader(FieldChecker):
             hint = did_you_mean(options.file, beside)
             self.fault((*at, "file"), f"there is no file {options.file!r}{hint}")
             return None
-        if self.is_full:
-            return None
         if file.resolve() in self.including:
             chain = " -> ".join(path.name for path in (*self.including, file.resolve()))
             self.fault((*at, "file"), f"the file includes itself: {chain}")
             return None
         try:
-            source = self.sources.get(file.resolve()) or read_yaml(file)
+            source = self.includes.source(file)
         except InvalidFile as error:
             self.faults.extend(error.faults)
             return None
-        self.sources[file.resolve()] = source
         tree = _Reader(
             source,
             self.faults,
             registry=self.registry,
             including=(*self.including, file.resolve()),
-            count=self.count,
-            sources=self.sources,
+            includes=self.includes,
             depth=depth,
             given=wires,
             included_at=self.place(at),
