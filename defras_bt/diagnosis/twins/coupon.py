@@ -33,6 +33,8 @@ _STILL = 1e-3
 """Of the largest rate of a run: with less it is held."""
 _WIDTHS = (0.1, 0.25, 0.5, 1.0)
 _TIMES = 12
+_ROUNDS = 4
+"""In which a pull is held out: its end alone would be asked beyond the range."""
 _SPLIT = 0.6
 _ENOUGH = 20
 """Rows; with fewer nothing is scored."""
@@ -218,7 +220,7 @@ def _samples(runs: Sequence[PullRun]) -> Samples:
         channel=np.zeros(sum(counts), np.int64),
         trajectory=np.repeat(np.arange(len(runs)), counts),
         phase=np.concatenate([_phases(run) for run in runs]),
-        fold=np.concatenate(fold_of_rows(counts)),
+        fold=np.concatenate(fold_of_rows(counts, rounds=_ROUNDS)),
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from defras_bt.diagnosis.problem import Candidate, Samples, Tangent
+from defras_bt.diagnosis.problem import Candidate, Integers, Samples, Tangent
 from defras_bt.diagnosis.quality import DataQuality
 from defras_sim.effects.effect import Effect, Extension, Values
 from defras_sim.geometry import Floats
@@ -106,15 +106,17 @@ def moved(at: Values, step: Values) -> dict[str, float]:
     return {**at, **{name: at.get(name, 0.0) + change for name, change in step.items()}}
 
 
-def fold_of_rows(rows: Sequence[int], folds: int = FOLDS) -> list[np.ndarray]:
+def fold_of_rows(rows: Sequence[int], folds: int = FOLDS, rounds: int = 1) -> list[Integers]:
     """Fold (rows,) of each row of each trajectory, given their numbers of rows.
 
-    Trajectories are folds where there are enough of them; otherwise each is cut into as many
-    stretches as make enough folds together.
+    Trajectories are folds where there are enough of them. Otherwise each is cut into stretches
+    that make enough folds together; in several ``rounds``, a fold gets a stretch of each round, so
+    that what rises all the time is held out at every height and not only at its end.
     """
     parts = max(1, -(-folds // len(rows)))
     found = []
     for trajectory, count in enumerate(rows):
-        stretch = np.arange(count) * parts // max(count, 1)
+        times = rounds if parts > 1 else 1
+        stretch = np.arange(count) * parts * times // max(count, 1) % parts
         found.append((trajectory * parts + stretch).astype(np.int64))
     return found
