@@ -91,11 +91,23 @@ def losses(found: Products, chosen: Integers, bounded: tuple[Bounded, ...] = ())
     gram = found.gram[:, chosen[:, None], chosen[None, :]]
     cross = found.cross[:, chosen]
     all_gram, all_cross = gram.sum(axis=0), cross.sum(axis=0)
-    limits = [(int(np.flatnonzero(chosen == b.column)[0]), b.lower, b.upper) for b in bounded]
+    limits = _limits(chosen, bounded)
     whole = _solve(all_gram[None], all_cross[None], limits)[0]
     parts = _solve(all_gram - gram, all_cross - cross, limits)
     fitted = found.total - _explained(all_gram[None], all_cross[None], whole[None])[0]
     return Loss(fitted, found.square - _explained(gram, cross, parts), whole, parts)
+
+
+def fitted_losses(found: Products, chosen: Integers, bounded: tuple[Bounded, ...] = ()) -> Floats:
+    """As :attr:`Loss.fitted` of :func:`losses` (s,), where nothing is held out."""
+    gram = found.gram[:, chosen[:, None], chosen[None, :]].sum(axis=0)[None]
+    cross = found.cross[:, chosen].sum(axis=0)[None]
+    whole = _solve(gram, cross, _limits(chosen, bounded))
+    return np.asarray(found.total - _explained(gram, cross, whole)[0])
+
+
+def _limits(chosen: Integers, bounded: tuple[Bounded, ...]) -> list[tuple[int, float, float]]:
+    return [(int(np.flatnonzero(chosen == b.column)[0]), b.lower, b.upper) for b in bounded]
 
 
 def _solve(gram: Floats, cross: Floats, limits: list[tuple[int, float, float]]) -> Floats:

@@ -58,10 +58,15 @@ class Noise:
             if not keep.any():
                 continue
             noise = self.channels[one.channel]
-            rows = np.arange(one.start, one.stop)[keep]
-            slot = one.slot[keep] - one.slot[keep][0]
-            found[rows] = innovations(columns[rows], slot, noise.ar, noise.innovation_sd)
-        return found * np.sqrt(self.weight)[:, None]
+            if keep.all():
+                own, slot = columns[one.rows], one.slot
+                found[one.rows] = innovations(own, slot, noise.ar, noise.innovation_sd)
+            else:
+                rows = np.arange(one.start, one.stop)[keep]
+                slot = one.slot[keep] - one.slot[keep][0]
+                found[rows] = innovations(columns[rows], slot, noise.ar, noise.innovation_sd)
+        found *= np.sqrt(self.weight)[:, None]
+        return found
 
 
 def tolerances(samples: Samples) -> Floats:

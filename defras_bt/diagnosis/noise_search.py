@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from defras_bt.diagnosis.columns import Option
-from defras_bt.diagnosis.held_out import Bounded, Products, losses, products
+from defras_bt.diagnosis.held_out import Bounded, Products, fitted_losses, losses, products
 from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise import ChannelNoise, Noise, estimate_noise
 from defras_bt.diagnosis.problem import Integers, Samples
@@ -57,16 +57,15 @@ def noise_beside(
     best = _without(residual, board, samples, found, first, removed)
     for _ in range(_MOST):
         noise, gone = best.noise, best.removed
+        promising, inner = _promising(best, board)
         tried = [
-            _without(residual, board, samples, found, noise, (*gone, *more))
-            for more in _promising(best, board)
+            _without(residual, board, samples, found, noise, (*gone, *more)) for more in promising
         ]
         tried = sorted((one for one in tried if _cost(one) < _cost(best)), key=_cost)
         if not tried:
             break
         best = tried[0]
         # What else was good and concerns other numbers may come along.
-        inner = whitened_products(board, noise, np.nan_to_num(residual)[:, None])
         more = best.removed
         for one in tried[1:]:
             new = one.removed[len(gone) :]
@@ -79,11 +78,11 @@ def noise_beside(
     return best
 
 
-def _promising(best: Beside, board: Board) -> list[Chosen]:
-    """Single candidates and pairs that explain most of a remainder."""
+def _promising(best: Beside, board: Board) -> tuple[list[Chosen], Products]:
+    """Single candidates and pairs that explain most of a remainder; inner products of it."""
     gone = {*board.nuisance, *(key for key, _ in best.removed)}
     chosen: dict[Chosen, None] = {}
-    for weighing in (best.noise, _white(best.noise)):
+    for weighing in (_white(best.noise), best.noise):
         inner = whitened_products(board, weighing, np.nan_to_num(best.remainder)[:, None])
         scores = score(board, inner)
         order = sorted(scores.best, key=lambda key: -float(scores.statistic(key)[0]))
@@ -92,7 +91,7 @@ def _promising(best: Beside, board: Board) -> list[Chosen]:
         for key in order:
             chosen.setdefault(((key, int(scores.option[key][0])),))
         chosen |= dict.fromkeys(_pairs(board, inner, order))
-    return list(chosen)
+    return list(chosen), inner
 
 
 def _pairs(board: Board, inner: Products, keys: Sequence[str]) -> list[Chosen]:
@@ -102,7 +101,7 @@ def _pairs(board: Board, inner: Products, keys: Sequence[str]) -> list[Chosen]:
         null = np.concatenate([board.always, *_nuisances(board, (first, second))])
         choices = [
             (
-                float(losses(inner, np.concatenate((null, one, other))).fitted[0]),
+                float(fitted_losses(inner, np.concatenate((null, one, other)))[0]),
                 ((first, i), (second, j)),
             )
             for i, (_, one) in enumerate(board.of_option[first])

@@ -24,7 +24,7 @@ class Settings:
     false_alarm: float = 0.05
     surrogates: int = 300
     tried: int = 4
-    causes: int = 4
+    causes: int = 12
     iterations: int = 6
     relative_gain: float = 0.03
     outside_share: float = 0.3
