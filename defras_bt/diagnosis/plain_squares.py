@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from defras_bt.diagnosis.excess import excess
-from defras_bt.diagnosis.fitting import refine
-from defras_bt.diagnosis.noise import estimate_noise
+from defras_bt.diagnosis.excess import excess, excess_of_sensors
+from defras_bt.diagnosis.fitting import Fit, refine, without
+from defras_bt.diagnosis.noise import Noise, estimate_noise
 from defras_bt.diagnosis.selection import Search
 
 _ROUNDS = 3
@@ -41,3 +41,25 @@ def fit_plainly(search: Search) -> None:
         search.fit, search.fitted_with = fit, white
         search.noise = estimate_noise(fit.residual, search.samples, search.layout)
         search.history.append(fit)
+        _drop_idle(search, white)
+
+
+def _drop_idle(search: Search, white: Noise) -> None:
+    """Take out causes without which no sensor's held-out excess is larger: whitened squares had
+    asked for them, to mend what plain ones do not leave."""
+    for key in search.accepted():
+        if len(search.accepted()) < 2:
+            return
+        less = without(
+            search.counted, search.fit, key, white, iterations=search.settings.iterations
+        )
+        now = _excess(search, search.fit)
+        then = _excess(search, less)
+        if not any(then[s] > (1.0 + search.settings.relative_gain) * now[s] for s in now):
+            search.fit = less
+            search.history.append(less)
+            search.rounds.append(replace(search.rounds[-1], trials=(), accepted=None, removed=key))
+
+
+def _excess(search: Search, fit: Fit) -> dict[str, float]:
+    return excess_of_sensors(search.held_out(fit, search.noise).residual, search.samples)
