@@ -29,7 +29,7 @@ from defras_bt.diagnosis.selection import Progress, select
 from defras_bt.diagnosis.sets import rivals
 from defras_bt.diagnosis.settings import Settings
 from defras_bt.diagnosis.verdict_building import diagnosis_of
-from defras_sim.effects.effect import Extension, Values
+from defras_sim.effects.effect import EffectParameter, Extension, Values
 from defras_sim.geometry import Floats
 
 
@@ -108,9 +108,15 @@ def _look(found: Findings, told: Progress) -> None:
 def _settle(found: Findings, told: Progress) -> None:
     """Intervals, rivals, what is left over, and what is excluded."""
     search = found.search
-    if search.fit.free:
+    while search.fit.free:
         told("how well parameters are known", 0.5)
         _arrived(found)
+        doubtful = [key for key in search.accepted() if _may_be_absent(found, key)]
+        if not doubtful:
+            break
+        # The last that came is the one that the others may have called for.
+        search.take_out(doubtful[-1])
+        del found.estimates[doubtful[-1]]
     for key in search.accepted():
         found.rivals[key] = rivals(search, key, found.confounding, told)
     told("what each cause gains", 0.6)
@@ -122,6 +128,20 @@ def _settle(found: Findings, told: Progress) -> None:
     )
     told("what is excluded", 0.8)
     found.excluded, found.unseen = exclusions(search)
+
+
+def _may_be_absent(found: Findings, key: str) -> bool:
+    """Whether the intervals of all of a cause's strengths contain their null: a name for what may
+    as well not be there helps nobody."""
+    candidate = found.search.sketch.candidate(key)
+    strengths = [p for p in candidate.free if p.strength]
+    estimated = found.estimates[key]
+
+    def contains_null(p: EffectParameter) -> bool:
+        low, high = estimated[p.name].interval90
+        return low <= p.null <= high
+
+    return bool(strengths) and all(contains_null(p) for p in strengths)
 
 
 def _measure_gains(found: Findings) -> None:

@@ -112,6 +112,16 @@ class Search:
         folds = self.samples.fold
         return hold_out(fit.residual, columns, noise, folds, len(fit.free), self.fitted_with)
 
+    def take_out(self, key: str) -> None:
+        """Remove an accepted cause, and fit the others anew."""
+        weighing = self.fitted_with or self.noise
+        rounds = self.settings.iterations
+        self.fit = without(self.counted, self.fit, key, weighing, iterations=rounds)
+        self.history.append(self.fit)
+        self.rounds.append(
+            Round((), self.rounds[-1].threshold if self.rounds else 0.0, None, removed=key)
+        )
+
 
 def select(search: Search, told: Progress) -> None:
     """Accept causes until none is left that is better than chance."""
