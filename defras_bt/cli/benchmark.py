@@ -10,6 +10,7 @@ import typer
 from defras_bt.benchmark.files import write_benchmark
 from defras_bt.benchmark.planner import planning_times
 from defras_bt.cli.benchmark_blame import blame
+from defras_bt.cli.benchmark_diagnosis import diagnosis
 from defras_bt.cli.benchmark_executive import executive
 from defras_bt.cli.benchmark_faults import faults
 from defras_bt.cli.benchmark_monitor import monitor
@@ -29,6 +30,7 @@ app.command("blame")(blame)
 app.command("executive")(executive)
 app.command("table1")(table1)
 app.command("table2")(table2)
+app.command("diagnosis")(diagnosis)
 app.command("faults")(faults)
 app.command("monitor")(monitor)
 app.command("tissue")(tissue)

@@ -1,0 +1,224 @@
+"""One case of the boards: data are made with a hidden cause, and the engine is asked."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from defras_bt.benchmark.cases import shipped
+from defras_bt.benchmark.diagnosis_cases import BoardCase, hidden_in_table
+from defras_bt.benchmark.hidden_draw import NULL, draw
+from defras_bt.benchmark.hidden_noise import NoiseSpectrum
+from defras_bt.benchmark.hidden_recording import ELEMENTS_XYZ, reality, record
+from defras_bt.benchmark.hidden_tables import arm_table, coupon_table
+from defras_bt.diagnosis.baselines import BASELINES, baseline
+from defras_bt.diagnosis.engine import diagnose
+from defras_bt.diagnosis.problem import Candidate, Problem, Samples, Tangent
+from defras_bt.diagnosis.recording_reader import read_recording
+from defras_bt.diagnosis.twins.tables import read_problem
+from defras_bt.diagnosis.twins.tissue import TissueProblem
+from defras_bt.diagnosis.twins.tissue_candidates import tissue_candidates
+from defras_bt.diagnosis.verdict import Verdict
+from defras_sim.effects.effect import Extension
+from defras_sim.geometry import Floats
+from defras_sim.worlds.error import WorldError
+
+_BELIEVED = "sim1"
+_POINT, _OTHER_POINT = (2, 4), (4, 4)
+_COARSE_XYZ, _COARSE_REAL_XYZ = (4, 4, 1), (6, 6, 1)
+
+
+@dataclass(frozen=True)
+class BoardRow:
+    """What was said in one case.
+
+    ``named`` are keys; ``alike`` are all that the verdict's set holds. ``covered``: for each
+    strength whose effect was named rightly, whether the 90 % interval holds the truth.
+    ``baselines``: by name, (alarm, named).
+    """
+
+    key: str
+    board: str
+    twin: str
+    causes: list[str]
+    verdict: str
+    named: list[str]
+    alike: list[str]
+    covered: dict[str, bool]
+    in_range: float | None
+    beyond_range: float | None
+    new_grasp: float | None
+    unexplained: float | None
+    wall_s: float
+    baselines: dict[str, list[Any]] = field(default_factory=dict)
+    error: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Without:
+    """``problem`` for somebody whose library lacks ``effects``."""
+
+    problem: Problem
+    effects: tuple[str, ...]
+
+    @property
+    def samples(self) -> Samples:
+        return self.problem.samples
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        return tuple(c for c in self.problem.candidates if c.effect.name not in self.effects)
+
+    def residual(self, model: Extension) -> Floats:
+        return self.problem.residual(model)
+
+    def tangents(self, model: Extension, candidate: Candidate) -> Sequence[Tangent]:
+        return self.problem.tangents(model, candidate)
+
+
+@dataclass(frozen=True)
+class _Material:
+    problem: Problem
+    beyond_range: Problem | None
+    new_grasp: Problem | None
+    hidden: Extension
+
+
+def board_rows(
+    cases: Sequence[BoardCase], *, coarse: bool, baselines: bool, jobs: int
+) -> Iterator[BoardRow]:
+    """A row for each case, as they end. ``coarse``: tissue on meshes of 4x4x1 (the model's) and
+    6x6x1 (reality's) elements, with nothing measured of other retractions."""
+    work = (delayed(board_row)(case, coarse=coarse, baselines=baselines) for case in cases)
+    yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(work)
+
+
+def board_row(case: BoardCase, *, coarse: bool, baselines: bool) -> BoardRow:
+    """Make the data of a case, and ask what is wrong with them.
+
+    Where reality itself finds no equilibrium there is nothing to ask; the row says so.
+    """
+    try:
+        return _asked(case, coarse=coarse, baselines=baselines)
+    except WorldError as error:
+        nothing: dict[str, bool] = {}
+        return BoardRow(
+            case.key,
+            case.board,
+            case.twin,
+            list(case.causes),
+            "",
+            [],
+            [],
+            nothing,
+            None,
+            None,
+            None,
+            None,
+            0.0,
+            {},
+            str(error),
+        )
+
+
+def _asked(case: BoardCase, *, coarse: bool, baselines: bool) -> BoardRow:
+    with TemporaryDirectory() as folder:
+        made = _made(case, Path(folder), coarse=coarse)
+        lacking = tuple(cause.split("@")[0] for cause in case.causes)
+        problem: Problem = made.problem
+        if case.board == "lacking":
+            problem = Without(problem, lacking)
+        began = time.perf_counter()
+        told = diagnose(
+            problem,
+            np.random.default_rng(case.seed),
+            beyond_range=made.beyond_range if case.board == "one" else None,
+            new_grasp=made.new_grasp if case.board == "one" else None,
+        )
+        wall_s = time.perf_counter() - began
+        others: dict[str, list[Any]] = {}
+        if baselines:
+            for name in BASELINES:
+                said = baseline(name, problem)
+                others[name] = [bool(said.alarm), said.named]
+    verdict = told.verdict
+    gain = verdict.gain
+    return BoardRow(
+        case.key,
+        case.board,
+        case.twin,
+        list(case.causes),
+        verdict.verdict,
+        [_key(cause.effect, cause.site) for cause in verdict.causes],
+        list(verdict.ambiguous),
+        _covered(verdict, made.hidden) if case.board == "one" else {},
+        gain.in_range,
+        gain.beyond_range,
+        gain.new_grasp,
+        verdict.unexplained_share,
+        round(wall_s, 2),
+        others,
+    )
+
+
+def _made(case: BoardCase, folder: Path, *, coarse: bool) -> _Material:
+    rng = np.random.default_rng([case.seed, *case.key.encode()])
+    if case.twin == "tissue":
+        return _retraction(case, folder, rng, coarse=coarse)
+    hidden = hidden_in_table(case, rng)
+    file = folder / "measured.csv"
+    (arm_table if case.twin == "arm" else coupon_table)(file, hidden, rng)
+    return _Material(read_problem([file], case.twin), None, None, hidden)
+
+
+def _retraction(
+    case: BoardCase, folder: Path, rng: np.random.Generator, *, coarse: bool
+) -> _Material:
+    scene = shipped(_BELIEVED)
+    if coarse:
+        tissue = scene.tissue.model_copy(update={"elements_xyz": _COARSE_XYZ})
+        scene = scene.model_copy(update={"tissue": tissue})
+    drawn = [draw(scene, cause, case.seed) for cause in case.causes or (NULL,)]
+    hidden: dict[str, dict[str, float]] = {}
+    for one in drawn:
+        hidden |= {effect: dict(values) for effect, values in one.hidden.items()}
+
+    def problem(point: tuple[int, int], number: int) -> TissueProblem:
+        # Other retractions go other ways: their heights and speeds are drawn anew.
+        script = draw(scene, NULL, case.seed + 7919 * number, point).script
+        file = folder / f"measured_{number}.mcap"
+        script = drawn[0].script if number == 0 else script
+        actual = reality(scene, hidden, elements_xyz=_COARSE_REAL_XYZ if coarse else ELEMENTS_XYZ)
+        record(actual, script, NoiseSpectrum(), rng, file)
+        run = read_recording(file, scene, None)
+        return TissueProblem(scene, [run], tissue_candidates(()), jobs=1)
+
+    main = problem(_POINT, 0)
+    if coarse or case.board != "one":
+        return _Material(main, None, None, hidden)
+    return _Material(main, problem(_POINT, 1), problem(_OTHER_POINT, 2), hidden)
+
+
+def _key(effect: str, site: str) -> str:
+    return f"{effect}@{site}" if site else effect
+
+
+def _covered(verdict: Verdict, hidden: Extension) -> dict[str, bool]:
+    found = {}
+    for cause in verdict.causes:
+        for name, truth in hidden.get(cause.effect, {}).items():
+            estimate = cause.parameters.get(name)
+            if estimate is not None:
+                low, high = estimate.interval90
+                found[f"{cause.effect}.{name}"] = bool(low <= truth <= high)
+    return found

@@ -1,0 +1,124 @@
+"""``defras benchmark diagnosis``: causes are hidden in data, and have to be found."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, get_args
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from defras_bt.benchmark.diagnosis_boards import boards
+from defras_bt.benchmark.diagnosis_cases import BoardCase, board_cases
+from defras_bt.benchmark.diagnosis_runs import BoardRow, board_rows
+from defras_bt.benchmark.files import write_benchmark
+from defras_bt.cli.errors import UserError
+from defras_bt.cli.files import folder_for
+from defras_sim.effects.effect import TwinName
+
+
+def diagnosis(
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/benchmark"),
+    quick: Annotated[
+        bool, typer.Option(help="Few runs, tissue on coarse meshes: twenty minutes.")
+    ] = False,
+    twins: Annotated[str, typer.Option(help="Separated by commas.")] = "coupon,arm,tissue",
+    seeds: Annotated[int | None, typer.Option(min=0, help="Runs of every cause.")] = None,
+    nulls: Annotated[int | None, typer.Option(min=0, help="Runs without any cause.")] = None,
+    first_seed: Annotated[int, typer.Option(min=0)] = 0,
+    jobs: Annotated[int, typer.Option(min=1, help="Runs side by side.")] = 2,
+    resume: Annotated[bool, typer.Option(help="Go on with the rows in the folder.")] = False,
+) -> None:
+    """How often a hidden cause is named, how often where there is none, and what naming it gains.
+
+    Data are made with another mesh, element, time step and noise than the model that diagnoses.
+    Textbook approaches are asked of the same data. Ctrl-C keeps the rows for --resume.
+
+    Example: defras benchmark diagnosis --quick --out out/benchmark
+    """
+    asked: list[TwinName] = []
+    for name in twins.split(","):
+        if name not in get_args(TwinName):
+            raise UserError(f"--twins {name}: valid are {', '.join(get_args(TwinName))}")
+        asked += [twin for twin in get_args(TwinName) if twin == name]
+    cases = [case for twin in asked for case in _cases(twin, quick, seeds, nulls, first_seed)]
+    folder_for(out)
+    file = out / "diagnosis.rows.jsonl"
+    rows = _known(file, quick) if resume else []
+    done = {row.key for row in rows}
+    left = [case for case in cases if case.key not in done]
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with (
+        file.open("a" if rows else "w", encoding="utf-8") as stream,
+        Progress(*columns, console=console, disable=not console.is_terminal) as bar,
+    ):
+        if not rows:
+            stream.write(json.dumps({"quick": quick}) + "\n")
+        task = bar.add_task("", total=len(cases), completed=len(cases) - len(left))
+        for row in board_rows(left, coarse=quick, baselines=True, jobs=jobs):
+            rows.append(row)
+            stream.write(json.dumps(row.as_dict()) + "\n")
+            stream.flush()
+            bar.advance(task)
+            said = ", ".join(row.named or row.alike) or "-"
+            console.print(f"{row.key}: {row.error or row.verdict}, {said}", markup=False)
+    wanted = {case.key for case in cases}
+    tables = boards([row for row in rows if row.key in wanted])
+    notes = [
+        "Right: just what was hidden was named. Macro: the mean over causes. Intervals are those "
+        "of 95 % (Clopper and Pearson). Removed: median share of the excess error, of what was "
+        "named rightly, on data that was not fitted.",
+        "Tissue on 4x4x1 (model) and 6x6x1 (reality) elements."
+        if quick
+        else "Tissue on the model's default mesh, reality on 10x10x1 quadratic tetrahedra.",
+    ]
+    write_benchmark(out, "diagnosis", "What the diagnosis finds", tables, notes)
+    file.unlink()
+    for head, table in tables.items():
+        if head in ("Every case", "Failed"):
+            continue
+        shown = Table(*map(str, table[0]), title=head)
+        for line in table:
+            shown.add_row(*map(str, line.values()))
+        Console().print(shown)
+    typer.echo(f"Written to {out}: diagnosis.json, diagnosis.csv, diagnosis.html")
+
+
+def _cases(
+    twin: TwinName, quick: bool, seeds: int | None, nulls: int | None, first_seed: int
+) -> list[BoardCase]:
+    usual = {
+        # seeds, nulls, lacking, pairs
+        ("coupon", True): (4, 40, 2, 6),
+        ("arm", True): (1, 8, 1, 2),
+        ("tissue", True): (1, 4, 0, 0),
+        ("coupon", False): (20, 200, 10, 30),
+        ("arm", False): (10, 200, 5, 30),
+        ("tissue", False): (5, 200, 3, 40),
+    }[twin, quick]
+    return board_cases(
+        twin,
+        seeds=usual[0] if seeds is None else seeds,
+        nulls=usual[1] if nulls is None else nulls,
+        lacking=usual[2],
+        pairs=usual[3],
+        first_seed=first_seed,
+    )
+
+
+def _known(file: Path, quick: bool) -> list[BoardRow]:
+    """Rows of an interrupted benchmark; the last may be cut short.
+
+    Raises:
+        UserError: they answer another question.
+    """
+    if not file.exists():
+        return []
+    lines = file.read_text(encoding="utf-8").split("\n")[:-1]
+    if not lines or json.loads(lines[0]) != {"quick": quick}:
+        raise UserError(f"{file} holds rows of another benchmark; start without --resume")
+    return [BoardRow(**json.loads(line)) for line in lines[1:]]
