@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from defras_bt.diagnosis.columns import Sketch, sketch
-from defras_bt.diagnosis.fitting import Addition, CountedProblem, Fit, begin, extend
+from defras_bt.diagnosis.fitted import CountedProblem, Fit, begin
+from defras_bt.diagnosis.fitting import Addition, extend
 from defras_bt.diagnosis.layout import layout
 from defras_bt.diagnosis.noise import Noise, estimate_noise
 from defras_bt.diagnosis.problem import Problem
 from defras_bt.diagnosis.ranking import board, score, start_of, whitened_products
-from defras_bt.diagnosis.selection import Progress, Search
+from defras_bt.diagnosis.search import Progress, Search
 from defras_bt.diagnosis.settings import Settings
 
 

@@ -14,18 +14,15 @@ from defras_bt.diagnosis.diagnosis import Diagnosis
 from defras_bt.diagnosis.excess import removed_share
 from defras_bt.diagnosis.exclusion import exclusions
 from defras_bt.diagnosis.findings import Findings
-from defras_bt.diagnosis.fitting import (
-    Fit,
-    bare,
-    differentiate,
-    refine,
-)
+from defras_bt.diagnosis.fitted import Fit, bare
+from defras_bt.diagnosis.fitting import differentiate, refine
 from defras_bt.diagnosis.further import measure_further
 from defras_bt.diagnosis.intervals import estimates, standard_errors
 from defras_bt.diagnosis.outside import left_over
 from defras_bt.diagnosis.plain_squares import fit_plainly
 from defras_bt.diagnosis.problem import Candidate, Problem, Remarking
-from defras_bt.diagnosis.selection import Progress, select
+from defras_bt.diagnosis.search import Progress
+from defras_bt.diagnosis.selection import select
 from defras_bt.diagnosis.sets import rivals
 from defras_bt.diagnosis.settings import Settings
 from defras_bt.diagnosis.verdict_building import diagnosis_of

@@ -11,7 +11,7 @@ from defras_bt.diagnosis.held_out import losses
 from defras_bt.diagnosis.noise_search import noise_beside
 from defras_bt.diagnosis.problem import Candidate, Samples
 from defras_bt.diagnosis.ranking import unseen, whitened_products
-from defras_bt.diagnosis.selection import Search, board_of
+from defras_bt.diagnosis.search import Search, board_of
 from defras_bt.diagnosis.verdict import Excluded
 from defras_sim.geometry import Floats
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from defras_bt.diagnosis.confounding import Confounding
-from defras_bt.diagnosis.fitting import Fit
+from defras_bt.diagnosis.fitted import Fit
 from defras_bt.diagnosis.outside import LeftOver
-from defras_bt.diagnosis.selection import Search
+from defras_bt.diagnosis.search import Search
 from defras_bt.diagnosis.verdict import Estimate, Excluded
 
 

@@ -6,15 +6,16 @@ where those do not name single parameters, and are kept current by Broyden's ran
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from defras_bt.diagnosis.columns import Option
+from defras_bt.diagnosis.fitted import CountedProblem, Fit, added, bare
 from defras_bt.diagnosis.noise import Noise
-from defras_bt.diagnosis.problem import Candidate, Problem
+from defras_bt.diagnosis.problem import Candidate
 from defras_sim.effects.effect import EffectParameter, Extension
 from defras_sim.geometry import Floats
 
@@ -24,84 +25,6 @@ _SMALLEST_GAIN = 1e-3
 """Relative gain of a step after which a fit has arrived."""
 _FINEST = 0.2
 """Of a parameter's step: strides below it are left to derivatives."""
-
-
-class CountedProblem:
-    """A problem's residuals with what was compared first as the yardstick, and calls counted.
-
-    Where an extended model stops predicting a number (it hides a place), the residual of the plain
-    model is kept for it, so that nothing is gained or lost by hiding. ``known`` models are not
-    predicted twice.
-    """
-
-    def __init__(self, problem: Problem, plain: Extension) -> None:
-        self.problem = problem
-        self.calls = 0
-        self._known: dict[str, Floats] = {}
-        self.plain = self._predict(plain)
-        if not np.isfinite(self.plain).any():
-            raise ValueError("the plain model cannot be compared with any of the data")
-
-    def residual(self, model: Extension) -> Floats:
-        """As :meth:`Problem.residual`, NaN only where the plain model's is (or everywhere)."""
-        found = self._predict(model)
-        if not np.isfinite(found).any():
-            return found
-        kept = np.where(np.isfinite(found), found, self.plain)
-        return np.where(np.isfinite(self.plain), kept, np.nan)
-
-    def _predict(self, model: Extension) -> Floats:
-        name = repr(sorted((effect, sorted(values.items())) for effect, values in model.items()))
-        if name not in self._known:
-            self._known[name] = np.asarray(self.problem.residual(model), dtype=float)
-            self.calls += 1
-        return self._known[name]
-
-
-@dataclass(frozen=True)
-class Fit:
-    """``candidates`` fitted together. ``jacobian`` (n, k): change of the prediction per step of
-    each of ``free`` (candidate key, parameter); ``residual`` (n,)."""
-
-    candidates: tuple[Candidate, ...]
-    model: Extension
-    free: tuple[tuple[str, EffectParameter], ...]
-    residual: Floats
-    jacobian: Floats
-    calls: int = 0
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        return tuple(c.key for c in self.candidates)
-
-    def values_of(self, key: str) -> dict[str, float]:
-        """Fitted parameters of one candidate."""
-        return {
-            p.name: self.model[c.effect.name][p.name]
-            for c in self.candidates
-            if c.key == key
-            for p in c.free
-        }
-
-
-def conflicts(first: Candidate, second: Candidate) -> bool:
-    """Whether both need the same parameters of one effect, so that they cannot be together."""
-    if first.effect.name != second.effect.name:
-        return False
-    names = {p.name for p in first.free}
-    return bool(names & {p.name for p in second.free}) or first.key == second.key
-
-
-def added(model: Extension, candidate: Candidate, values: Mapping[str, float]) -> Extension:
-    """``model`` with ``values`` of the candidate's effect."""
-    name = candidate.effect.name
-    return {**model, name: {**model.get(name, {}), **values}}
-
-
-def begin(counted: CountedProblem, model: Extension) -> Fit:
-    """A fit of nothing."""
-    residual = counted.residual(model)
-    return Fit((), model, (), residual, np.zeros((len(residual), 0)))
 
 
 @dataclass(frozen=True)
@@ -151,32 +74,6 @@ def extend(
 def without(counted: CountedProblem, fit: Fit, key: str, noise: Noise, *, iterations: int) -> Fit:
     """``fit`` with one of its candidates taken out and the others fitted anew."""
     return refine(counted, bare(counted, fit, key), noise, iterations=iterations)
-
-
-def model_without(fit: Fit, key: str) -> Extension:
-    """The fitted model less one candidate's parameters."""
-    gone = next(c for c in fit.candidates if c.key == key)
-    others = [c for c in fit.candidates if c.key != key]
-    values = dict(fit.model[gone.effect.name])
-    for p in gone.effect.parameters:
-        shared = any(c.effect is gone.effect for c in others)
-        if p.name in values and (not shared or p in gone.free):
-            del values[p.name]
-    model = {name: v for name, v in fit.model.items() if name != gone.effect.name}
-    return {**model, gone.effect.name: values} if values else model
-
-
-def bare(counted: CountedProblem, fit: Fit, key: str) -> Fit:
-    """``fit`` with one of its candidates taken out and the others left as they are."""
-    keep = [i for i, (k, _) in enumerate(fit.free) if k != key]
-    model = model_without(fit, key)
-    return Fit(
-        tuple(c for c in fit.candidates if c.key != key),
-        model,
-        tuple(fit.free[i] for i in keep),
-        counted.residual(model),
-        fit.jacobian[:, keep],
-    )
 
 
 def refine(counted: CountedProblem, fit: Fit, noise: Noise, *, iterations: int) -> Fit:

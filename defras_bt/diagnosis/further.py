@@ -6,7 +6,7 @@ from defras_bt.diagnosis.beginning import begun, fitted_base, start_and_extend
 from defras_bt.diagnosis.columns import sketch
 from defras_bt.diagnosis.excess import removed_share
 from defras_bt.diagnosis.findings import Findings
-from defras_bt.diagnosis.fitting import Fit
+from defras_bt.diagnosis.fitted import Fit
 from defras_bt.diagnosis.problem import Extrapolating, Problem
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.stats import norm, t
 
-from defras_bt.diagnosis.fitting import Fit
+from defras_bt.diagnosis.fitted import Fit
 from defras_bt.diagnosis.held_out import products
 from defras_bt.diagnosis.noise import Noise
 from defras_bt.diagnosis.problem import Candidate, Samples

@@ -13,9 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from defras_bt.diagnosis.excess import excess, excess_of_sensors
-from defras_bt.diagnosis.fitting import Fit, refine, without
+from defras_bt.diagnosis.fitted import Fit
+from defras_bt.diagnosis.fitting import refine, without
 from defras_bt.diagnosis.noise import Noise, estimate_noise
-from defras_bt.diagnosis.selection import Search
+from defras_bt.diagnosis.search import Search
 
 _ROUNDS = 3
 """Of fits, each with weights of what the last one left over."""

@@ -18,7 +18,7 @@ from defras_bt.diagnosis.ranking import board, remainder, score, start_of, white
 from defras_sim.geometry import Floats
 
 if TYPE_CHECKING:
-    from defras_bt.diagnosis.selection import Progress, Search
+    from defras_bt.diagnosis.search import Progress, Search
 
 
 def restart(search: Search, told: Progress) -> bool:

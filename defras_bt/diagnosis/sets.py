@@ -10,10 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from defras_bt.diagnosis.confounding import Confounding
-from defras_bt.diagnosis.fitting import Addition, Fit, conflicts, extend, without
+from defras_bt.diagnosis.fitted import Fit, conflicts
+from defras_bt.diagnosis.fitting import Addition, extend, without
 from defras_bt.diagnosis.held_out import losses, products
 from defras_bt.diagnosis.ranking import board, score, start_of, whitened_products
-from defras_bt.diagnosis.selection import Progress, Search
+from defras_bt.diagnosis.search import Progress, Search
 from defras_bt.diagnosis.surrogates import surrogates
 from defras_sim.geometry import Floats
 

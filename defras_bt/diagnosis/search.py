@@ -1,0 +1,87 @@
+"""What a selection has found so far."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from defras_bt.diagnosis.columns import Sketch
+from defras_bt.diagnosis.diagnosis import Ranked, RankedPair, Round
+from defras_bt.diagnosis.fitted import CountedProblem, Fit, conflicts
+from defras_bt.diagnosis.fitting import without
+from defras_bt.diagnosis.layout import Layout
+from defras_bt.diagnosis.noise import Noise
+from defras_bt.diagnosis.noise_search import Chosen
+from defras_bt.diagnosis.predicted_folds import HeldOut, hold_out
+from defras_bt.diagnosis.problem import Samples
+from defras_bt.diagnosis.ranking import Board, board
+from defras_bt.diagnosis.settings import Settings
+from defras_sim.geometry import Floats
+
+Progress = Callable[[str, float], None]
+"""Is told a sentence and the share of it that is done."""
+
+
+@dataclass
+class Search:
+    """What the selection has found so far; kept up to date, so that an interrupted search can be
+    reported. ``fitted_with``: as if the noise were this parameters were fitted in the end, where
+    that predicts better than ``noise``."""
+
+    counted: CountedProblem
+    samples: Samples
+    layout: Layout
+    sketch: Sketch
+    settings: Settings
+    rng: np.random.Generator
+    fit: Fit
+    noise: Noise
+    fitted_with: Noise | None = None
+    removed: Chosen = ()
+    fits: dict[str, dict[str, Fit]] = field(default_factory=dict)
+    history: list[Fit] = field(default_factory=list)
+    rounds: list[Round] = field(default_factory=list)
+    ranking: tuple[Ranked, ...] = ()
+    pairs: tuple[RankedPair, ...] = ()
+
+    def accepted(self) -> tuple[str, ...]:
+        """Candidates of the present model that are not base."""
+        return tuple(c.key for c in self.fit.candidates if not c.base)
+
+    def open_keys(self) -> tuple[str, ...]:
+        """Candidates that could still be added, and nuisances that are not in the model."""
+        return tuple(
+            c.key
+            for c in self.sketch.candidates
+            if not c.base and not any(conflicts(c, other) for other in self.fit.candidates)
+        )
+
+    def nuisance_columns(self, *without: str) -> Floats:
+        """Columns (n, k) of nuisances that are not in the model."""
+        inside = {c.key for c in self.fit.candidates}
+        options = self.sketch.nuisances(*without, *inside)
+        size = len(self.samples.time_s)
+        return np.concatenate([np.zeros((size, 0)), *[o.columns for o in options]], axis=1)
+
+    def held_out(self, fit: Fit, noise: Noise, *without: str) -> HeldOut:
+        """``fit`` with every fold predicted from the others, nuisances re-tuned."""
+        columns = np.concatenate((fit.jacobian, self.nuisance_columns(*without)), axis=1)
+        folds = self.samples.fold
+        return hold_out(fit.residual, columns, noise, folds, len(fit.free), self.fitted_with)
+
+    def take_out(self, key: str) -> None:
+        """Remove an accepted cause, and fit the others anew."""
+        weighing = self.fitted_with or self.noise
+        rounds = self.settings.iterations
+        self.fit = without(self.counted, self.fit, key, weighing, iterations=rounds)
+        self.history.append(self.fit)
+        self.rounds.append(
+            Round((), self.rounds[-1].threshold if self.rounds else 0.0, None, removed=key)
+        )
+
+
+def board_of(search: Search) -> Board:
+    """Candidates that are still open, beside the present model."""
+    return board(search.sketch, search.fit.jacobian, search.samples.fold, search.open_keys())
