@@ -10,7 +10,7 @@ SLACK = {"joint_play": (1.0, 3.0)}
 """Effects without a derivative at their null point, and of how many steps of theirs to try."""
 ONSET = {"grasp_slip": "time_s", "attachment_tear": "time_s"}
 """Effects that begin during the motion, and the parameter that says when."""
-ONSETS = 7
+ONSETS = 4
 STRONG = {"extra_attachment": 300.0, "missing_attachment": 1.0, "inclusion": 4.0}
 """Effects of a place whose beginning says little of how they end: a soft spring under tissue that
 is lifted far pulls ever more, a firm one holds it. The strength at which they are tried in full, at
