@@ -12,6 +12,8 @@ from defras_bt.diagnosis.surrogates import surrogates
 from defras_sim.geometry import Floats
 
 _PREDICTABLE = 0.15
+"""Share of a variance."""
+_CHANCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -31,26 +33,31 @@ def left_over(
 ) -> LeftOver:
     """Examine ``residual`` (n,), whose noise was estimated as ``noise``.
 
-    A sensor's mean square must exceed its scatter by more than 95 % of surrogates vary, and by
-    more than the floor squared; and its own past must predict a part, or channels move together.
+    The mean square of a sensor, or of one of its channels, must exceed its scatter by more than
+    95 % of surrogates vary (of channels: the one that varies most), and by more than the floor
+    squared; and its own past must predict a part.
     """
-    scatter = np.array([c.noise_sd for c in samples.channels])[samples.channel]
-    floor = np.array([c.floor for c in samples.channels])[samples.channel]
     drawn = np.concatenate(list(surrogates(noise, residual, count, rng)), axis=1)
     sensors = []
     for sensor in dict.fromkeys(c.sensor for c in samples.channels):
         own = [i for i, c in enumerate(samples.channels) if c.sensor == sensor]
-        keep = np.isin(samples.channel, own) & np.isfinite(residual)
-        if not keep.any():
+        rows = [np.flatnonzero((samples.channel == i) & np.isfinite(residual)) for i in own]
+        own = [i for i, keep in zip(own, rows, strict=True) if len(keep)]
+        rows = [keep for keep in rows if len(keep)]
+        if not own:
             continue
-        square = float(np.mean(residual[keep] ** 2))
-        spread = np.mean(drawn[keep] ** 2, axis=0)
-        ratio = float(np.quantile(spread / max(spread.mean(), 1e-300), 0.95))
-        expected = float(np.mean(scatter[keep] ** 2)) * ratio
-        practical = float(np.mean(floor[keep] ** 2))
-        if square <= expected + practical:
-            continue
-        if _order(noise, own) > _PREDICTABLE:
+        counts = np.array([len(keep) for keep in rows], dtype=float)
+        squares = np.array([np.mean(residual[keep] ** 2) for keep in rows])
+        spread = np.stack([np.mean(drawn[keep] ** 2, axis=0) for keep in rows])
+        spread = spread / np.maximum(spread.mean(axis=1, keepdims=True), 1e-300)
+        scatter = np.array([samples.channels[i].noise_sd ** 2 for i in own])
+        floor = np.array([samples.channels[i].floor ** 2 for i in own])
+        largest = float(np.quantile(spread.max(axis=0), _CHANCE))
+        together = float(np.quantile(counts @ (scatter[:, None] * spread), _CHANCE))
+        whole = counts @ squares > together + counts @ floor
+        single = squares > scatter * largest + floor
+        conspicuous = own if whole else [i for i, one in zip(own, single, strict=True) if one]
+        if conspicuous and _order(noise, conspicuous) > _PREDICTABLE:
             sensors.append(sensor)
     return LeftOver(tuple(sensors))
 

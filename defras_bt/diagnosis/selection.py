@@ -16,12 +16,13 @@ from defras_bt.diagnosis.chance import known_noise, maxima
 from defras_bt.diagnosis.contest import accepted_of, accepted_together
 from defras_bt.diagnosis.diagnosis import Round
 from defras_bt.diagnosis.fitting import without
+from defras_bt.diagnosis.held_out import Products
 from defras_bt.diagnosis.noise_bias import KnownNoise
 from defras_bt.diagnosis.noise_search import noise_beside
 from defras_bt.diagnosis.ranking import Board, ranked, ranked_pairs, whitened_products
 from defras_bt.diagnosis.restarts import restart
 from defras_bt.diagnosis.search import Progress, Search, board_of
-from defras_bt.diagnosis.short_list import contests, hopeful, worth_naming
+from defras_bt.diagnosis.short_list import contests, hopeful, nuisances, worth_naming
 from defras_sim.geometry import Floats
 
 _FAR_ABOVE = 3.0
@@ -63,15 +64,33 @@ def _forward(search: Search, told: Progress) -> bool:
     limit = _threshold(search, now, known, beside.remainder, rows[0].held_out)
     if len(beside.removed) > 1 and accepted_together(search, now, found, beside, limit):
         return True
-    groups = contests(now, found, hopeful(search, worth_naming(search, now, found, rows), limit))
+    worth = worth_naming(search, now, found, rows)
+    tried = hopeful(search, worth, limit)
+    accepted = _contested(search, now, found, contests(now, found, tried), limit, told)
+    waiting = [row for row in nuisances(search, worth, limit) if row not in tried]
+    if not accepted and waiting:
+        # What is above chance and of no use may wait for a nuisance to be out of its way.
+        accepted = _contested(search, now, found, contests(now, found, waiting), limit, told)
+    if not tried and not waiting:
+        search.rounds.append(Round((), limit, None))
+    return accepted
+
+
+def _contested(
+    search: Search,
+    now: Board,
+    found: Products,
+    groups: list[tuple[str, ...]],
+    limit: float,
+    told: Progress,
+) -> bool:
+    """Fit and judge groups of candidates in turn; whether any of them was accepted."""
     accepted = False
     for index, keys in enumerate(groups):
         if index and len(search.accepted()) >= search.settings.causes:
             break
-        told(f"round {number}: fitting {', '.join(keys)}", 0.3 + 0.7 * index / len(groups))
+        told(f"fitting {', '.join(keys)}", 0.3 + 0.7 * index / len(groups))
         accepted |= accepted_of(search, now, found, keys, limit)
-    if not groups:
-        search.rounds.append(Round((), limit, None))
     return accepted
 
 

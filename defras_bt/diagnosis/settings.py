@@ -12,7 +12,7 @@ class Settings:
     Attributes:
         false_alarm: how often anything may be named where there is nothing.
         surrogates: residuals of the same autocorrelation that chance is measured with.
-        tried: candidates that are fitted fully in each round.
+        tried: candidates that are fitted fully in each round, at most.
         causes: how many causes may be named at most.
         iterations: of a full fit; each costs a call of the residual, or a few.
         relative_gain: share of the remaining excess that a cause has to remove, held out.
@@ -23,7 +23,7 @@ class Settings:
 
     false_alarm: float = 0.05
     surrogates: int = 300
-    tried: int = 4
+    tried: int = 6
     causes: int = 12
     iterations: int = 6
     relative_gain: float = 0.03

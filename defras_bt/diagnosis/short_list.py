@@ -51,7 +51,18 @@ def hopeful(search: Search, rows: tuple[Ranked, ...], limit: float) -> list[Rank
     proper = [row for row in enough if not search.sketch.candidate(row.key).nuisance]
     chosen = proper if any(row.held_out > limit for row in proper) else enough
     above = [row for row in chosen if row.held_out > limit]
-    return (above or chosen)[: 2 * search.settings.tried]
+    return (above or chosen)[: search.settings.tried]
+
+
+def nuisances(search: Search, rows: tuple[Ranked, ...], limit: float) -> list[Ranked]:
+    """The nuisances that are worth a full fit."""
+    return [
+        row
+        for row in rows
+        if search.sketch.candidate(row.key).nuisance
+        and row.visible
+        and row.held_out > _HOPELESS * limit
+    ]
 
 
 def contests(now: Board, found: Products, rows: Sequence[Ranked]) -> list[tuple[str, ...]]:
