@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import Annotated, Any, get_args
 
 import typer
 from rich.console import Console
@@ -81,11 +82,24 @@ def diagnosis(
     for head, table in tables.items():
         if head in ("Every case", "Failed"):
             continue
-        shown = Table(*map(str, table[0]), title=head)
-        for line in table:
-            shown.add_row(*map(str, line.values()))
-        Console().print(shown)
+        Console().print(_turned(head, table) if head == "Score" else _table(head, table))
     typer.echo(f"Written to {out}: diagnosis.json, diagnosis.csv, diagnosis.html")
+
+
+def _table(head: str, table: Sequence[Mapping[str, Any]]) -> Table:
+    shown = Table(*map(str, table[0]), title=head)
+    for line in table:
+        shown.add_row(*map(str, line.values()))
+    return shown
+
+
+def _turned(head: str, table: Sequence[Mapping[str, Any]]) -> Table:
+    """A column for each line: there are more measures than fit side by side."""
+    first, *measures = table[0]
+    shown = Table(first, *(str(line[first]) for line in table), title=head)
+    for measure in measures:
+        shown.add_row(measure, *(str(line[measure]) for line in table))
+    return shown
 
 
 def _cases(

@@ -1,0 +1,109 @@
+"""The boards of the diagnosis: cases, what counts as right, and the command."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from defras_bt.benchmark.diagnosis_boards import boards, confusion, is_right
+from defras_bt.benchmark.diagnosis_cases import CAUSES, BoardCase, board_cases
+from defras_bt.benchmark.diagnosis_runs import BoardRow, board_row
+from defras_bt.cli.main import main
+from defras_sim.effects.effect import TwinName
+from defras_sim.effects.library import effect
+
+
+def row(board: str, causes: list[str], verdict: str, named: list[str], *alike: str) -> BoardRow:
+    return BoardRow(
+        " ".join([board, *causes]), board, "coupon", causes, verdict, named, list(alike), {}, 0.9,
+        None, None, 0.1, 1.0, {"F-test": [True, "softening"], "BIC": [False, None],
+        "median distance": [False, None], "ridge on the residual": [False, None]},
+    )  # fmt: skip
+
+
+ROWS = [
+    row("one", ["softening"], "named", ["softening"]),
+    row("one", ["stress_relaxation"], "named", ["softening"]),
+    row("one", ["strain_stiffening"], "set", [], "strain_stiffening", "softening"),
+    row("nothing", [], "nothing", []),
+    row("nothing", [], "outside", []),
+    row("lacking", ["softening"], "outside", []),
+    row("two", ["softening", "stress_relaxation"], "named", ["stress_relaxation", "softening"]),
+]
+
+
+def test_right_is_just_what_was_hidden() -> None:
+    assert [is_right(one) for one in ROWS[:3]] == [True, False, False]
+    assert is_right(ROWS[-1])
+
+
+def test_scores_count_each_board_by_itself() -> None:
+    (score,) = boards(ROWS)["Score"]
+    assert score["named right (macro)"] == "33% of 3"
+    assert score["right or in the set"].startswith("67% (")
+    assert score["false alarm"].startswith("50% (")
+    assert score["lacking: outside"].startswith("100% (")
+    assert score["two: both named or a set"].endswith("of 1")
+
+
+def test_confusion_is_a_row_for_each_cause() -> None:
+    table = {line["hidden"]: line for line in confusion(ROWS, "coupon")}
+    assert table["stress_relaxation"]["softening"] == 1
+    assert table["strain_stiffening"]["(set)"] == 1
+    assert table["nothing"]["(outside)"] == 1
+    assert table["nothing"]["runs"] == 2
+
+
+def test_baselines_stand_beside_on_the_same_cases() -> None:
+    beside = {line["approach"]: line for line in boards(ROWS)["Beside the baselines"]}
+    assert beside["F-test"]["false alarm"].startswith("100% (")
+    assert beside["BIC"]["false alarm"].startswith("0% (")
+    assert beside["this engine"]["false alarm"].startswith("50% (")
+
+
+@pytest.mark.parametrize("twin", ["arm", "coupon", "tissue"])
+def test_cases_are_of_known_effects_and_all_different(twin: TwinName) -> None:
+    cases = board_cases(twin, seeds=2, nulls=3, lacking=1, pairs=4)
+    assert len({case.key for case in cases}) == len(cases)
+    for cause in CAUSES[twin]:
+        assert twin in effect(cause.split("@")[0]).twins
+    assert all(len({c.split("@")[0] for c in case.causes}) == 2 for case in cases[-4:])
+
+
+def test_a_hidden_law_of_a_specimen_is_found_and_outside_where_it_is_lacking() -> None:
+    found = board_row(
+        BoardCase("one", "coupon", ("stress_relaxation",), 0), coarse=True, baselines=False
+    )
+    assert found.named == ["stress_relaxation"]
+    assert found.covered
+    lacking = board_row(
+        BoardCase("lacking", "coupon", ("stress_relaxation",), 500), coarse=True, baselines=False
+    )
+    assert lacking.verdict == "outside"
+    assert lacking.named == []
+
+
+def test_the_command_leaves_its_boards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    arguments = [
+        "diagnosis",
+        "--quick",
+        "--twins",
+        "coupon",
+        "--seeds",
+        "0",
+        "--nulls",
+        "2",
+        "--jobs",
+        "1",
+        "--out",
+    ]
+    monkeypatch.setattr(sys, "argv", ["defras", "benchmark", *arguments, str(tmp_path)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 0
+    written = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert written["tables"]["Score"][0]["false alarm"].endswith("of 2")
+    assert not list(tmp_path.glob("*.jsonl"))
