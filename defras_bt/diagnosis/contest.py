@@ -14,14 +14,20 @@ from defras_bt.diagnosis.noise_search import Beside
 from defras_bt.diagnosis.ranking import Board, bounds_of, score, start_of
 from defras_bt.diagnosis.search import Search
 
+_CLEARLY = 2.0
+"""Of the threshold, for causes that are accepted together."""
+
 
 def accepted_together(
     search: Search, now: Board, found: Products, beside: Beside, limit: float
 ) -> bool:
     """Try all causes at once that the noise was estimated beside; whether any was accepted.
 
-    Of causes that hide each other none is above chance alone. Each has to be so beside the others.
+    Of causes that hide each other none is above chance alone. Each has to be so beside the others,
+    and clearly, since the noise was estimated with all of them gone; one that is only just above
+    chance waits for a round of its own.
     """
+    limit *= _CLEARLY
     index = np.concatenate([now.null(""), *(own for _, own in beside.columns_of(now))])
     bounds = tuple(b for option, own in beside.columns_of(now) for b in bounds_of(option, own))
     left = losses(found, index, bounds).amplitudes[len(now.null("")) :, 0]
@@ -48,8 +54,9 @@ def accepted_together(
         )
     if fit is None:
         return False
-    search.rounds += [Round((trial,), limit, trial.key) for trial in trials]
+    search.rounds += [Round((trial,), limit / _CLEARLY, trial.key) for trial in trials]
     search.fit, search.noise = fit, after
+    search.removed = ()
     search.history.append(fit)
     return True
 
