@@ -60,6 +60,9 @@ class Effect(ABC):
     """The safe motion that shows it best."""
     source: ClassVar[str]
 
+    def __repr__(self) -> str:
+        return self.name
+
     def complete(self, values: Values) -> dict[str, float]:
         """All parameters, null where ``values`` does not name them.
 
