@@ -30,7 +30,7 @@ from defras_bt.faults.system import DiskFull, Killed
 from defras_bt.planning.preparation import Preparation, prepare
 from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.record import Recorder
-from defras_bt.recording.summary import SummaryRecorder
+from defras_bt.recording.summary import SummaryRecorder, read_run_json
 from defras_bt.recording.timeline import TimelineRecorder
 from defras_sim.resources import resource
 
@@ -127,7 +127,10 @@ def _until_s(faults: Faults, end_s: float) -> dict[str, float]:
 
 
 def _judged_killed(operation: Operation, faults: Faults, out: Path) -> Verdict:
-    """Run in a process of its own, which kills itself; what it left must be readable."""
+    """Run in a process of its own, which kills itself; what it left must be readable.
+
+    A run that reached its outcome before it would have been killed is judged by its end.
+    """
     context = multiprocessing.get_context("spawn")
     process = context.Process(target=_until_killed, args=(operation, faults, out))
     process.start()
@@ -136,6 +139,13 @@ def _judged_killed(operation: Operation, faults: Faults, out: Path) -> Verdict:
         process.kill()
         process.join()
     killed_s = faults.faults[0].start_s
+    if process.exitcode == 0:
+        numbers = read_run_json(out / NUMBERS)
+        end_s, outcome = numbers.duration_s, numbers.outcome
+        if end_s < killed_s:
+            lost = lost_recordings(out, dict.fromkeys((TIMELINE, RECORDING, NUMBERS), end_s))
+            why = "the run ended before it would have been killed"
+            return Verdict(outcome, why, 0, False, 0, 0, 0, tuple(lost), "")
     by_signal = process.exitcode == -signal.SIGKILL
     broke = "" if by_signal else f"it ended with exit code {process.exitcode}, not killed"
     lost = lost_recordings(out, {TIMELINE: killed_s, RECORDING: killed_s})
@@ -202,13 +212,18 @@ def by_run(runs: Sequence[FaultRun]) -> list[dict[str, Any]]:
 def passed(runs: Sequence[FaultRun]) -> bool:
     """Whether nothing went wrong that should not, and every run ended as its fault allows."""
     return not any(
-        v.late or v.wrong or v.lost or v.broke or not v.reason or v.outcome not in _endings(kind)
+        v.late
+        or v.wrong
+        or v.lost
+        or v.broke
+        or not v.reason
+        or v.outcome not in _endings(kind, v.tripped)
         for kind, v in ((run.kind, run.verdict) for run in runs)
     )
 
 
-def _endings(kind: str) -> tuple[str, ...]:
-    """The outcomes that a fault of ``kind`` may lead to."""
+def _endings(kind: str, tripped: bool) -> tuple[str, ...]:
+    """The outcomes that a fault of ``kind`` may lead to, if it came (``tripped``) to it."""
     if kind == Killed.kind:
-        return ("killed",)
+        return ("killed",) if tripped else _DECIDED
     return (*_DECIDED, "error") if KINDS[kind].ends_runs_with else _DECIDED

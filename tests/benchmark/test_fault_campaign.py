@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from defras_bt.benchmark.fault_cases import drawn_fault
 from defras_bt.benchmark.fault_judge import Moment, Witness, late_motion, lost_recordings, verdict
 from defras_bt.benchmark.faults import FaultRun, by_kind, by_run, fault_run, passed
-from defras_bt.faults.faults import KINDS
+from defras_bt.faults.faults import KINDS, Faults
+from defras_bt.faults.system import Killed
 from defras_bt.planning.preparation import Preparation
 
 # As rehearsed once for the campaign's patient; without a plan, so that nothing is rehearsed here.
@@ -133,7 +136,8 @@ def test_a_recorder_that_breaks_by_itself_fails_the_campaign(
 def test_a_run_ends_only_as_its_fault_allows(kind: str, outcome: str, fine: bool) -> None:
     witness = Witness()
     witness.outcome, witness.reason = outcome, "done"
-    assert passed([FaultRun(kind, 0, 1.0, verdict(witness, [], []))]) is fine
+    judged = replace(verdict(witness, [], []), tripped=True)
+    assert passed([FaultRun(kind, 0, 1.0, judged)]) is fine
 
 
 def test_tables_count_what_was_judged() -> None:
@@ -148,3 +152,14 @@ def test_tables_count_what_was_judged() -> None:
     assert [line["seed"] for line in by_run([bad, good])] == [1, 2]
     assert passed([good])
     assert not passed([good, bad])
+
+
+def test_a_run_that_ends_before_it_would_be_killed_is_judged_by_its_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    late = Faults((Killed(start_s=250.0),))
+    monkeypatch.setattr("defras_bt.benchmark.faults.drawn_fault", lambda *_: late)
+    run = fault_run("killed", 0, PREPARED, "fras")
+    assert run.verdict.outcome in ("goal", "human", "not_reached")
+    assert (run.verdict.lost, run.verdict.broke) == ((), "")
+    assert passed([run])

@@ -43,7 +43,7 @@ def test_a_good_scene_passes(defras: Defras, tmp_path: Path) -> None:
         ({"motion": "{pull_height_m: -0.04}"}, ":17:10:", "greater than 0"),
         ({"grasp": "{columns: 41}"}, ":17:9:", "less than or equal to 40"),
         ({"grasp": "{margin_m: 0.058}"}, ":17:9:", "room"),
-        ({"model": "{effects: [{effect: gravity}]}"}, ":17:", "gravity"),
+        ({"model": "{effects: [{effect: gravitty}]}"}, ":17:", "did you mean gravity"),
         ({"extends": "nowhere.yaml"}, ":17:1:", "nowhere.yaml"),
     ],
 )

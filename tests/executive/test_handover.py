@@ -129,7 +129,7 @@ class TestTakenOver:
         taken.ticks(1.0)
         assert taken.board.outcome is None
         taken.operator(Act.HAND_BACK)
-        taken.tick()
+        taken.until_over()
         assert taken.board.outcome == "goal"
 
     @pytest.mark.parametrize("trouble", ["warning", "force", "camera"])

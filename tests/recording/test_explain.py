@@ -86,7 +86,7 @@ def test_an_end_short_of_the_goal_is_told_with_its_reason(stage: Stage) -> None:
 def test_a_goal_needs_no_excuse(stage: Stage) -> None:
     stage.until_doing("reach")
     stage.bench.world.visibility = 1.0
-    stage.tick()
+    stage.until_over()
     assert stage.notes.told("why") == []
     assert explained(stage).decided.endswith("the goal is reached [goal].")
 

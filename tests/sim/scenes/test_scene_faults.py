@@ -108,7 +108,11 @@ def test_the_good_file_is_good(tmp_path: Path) -> None:
         (GOOD + "tissue:\n  elements_xyz: [8, 0, 1]\n", "20:3", ("1 or more",)),
         (GOOD + "simulation:\n  elements_xyz: [8, 0, 1]\n", "20:3", ("1 or more",)),
         (GOOD + "tissue:\n  elements_xyz: [8, 8000, 1]\n", "20:3", ("at most 64",)),
-        (GOOD + "model:\n  effects:\n    - {effect: magic}\n", "21:7", ("'magic' is unknown",)),
+        (
+            GOOD + "model:\n  effects:\n    - {effect: magic}\n",
+            "21:8",
+            ("no effect 'magic'", "valid: anisotropy"),
+        ),
         ("", "1:1", ("mapping",)),
         ("- a\n- b\n", "1:1", ("mapping",)),
     ],
