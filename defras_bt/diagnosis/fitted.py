@@ -104,13 +104,19 @@ def model_without(fit: Fit, key: str) -> Extension:
 
 
 def bare(counted: CountedProblem, fit: Fit, key: str) -> Fit:
-    """``fit`` with one of its candidates taken out and the others left as they are."""
+    """``fit`` with one of its candidates taken out and the others left as they are.
+
+    Where the twin cannot follow what is left, that explains no more than the plain model.
+    """
     keep = [i for i, (k, _) in enumerate(fit.free) if k != key]
     model = model_without(fit, key)
+    residual = counted.residual(model)
+    if not np.isfinite(residual).any():
+        residual = counted.plain
     return Fit(
         tuple(c for c in fit.candidates if c.key != key),
         model,
         tuple(fit.free[i] for i in keep),
-        counted.residual(model),
+        residual,
         fit.jacobian[:, keep],
     )

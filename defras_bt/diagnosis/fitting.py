@@ -93,6 +93,8 @@ def refine(counted: CountedProblem, fit: Fit, noise: Noise, *, iterations: int) 
         if np.abs(step).max() < 1e-4:
             break
         there = np.clip(place + step, lower, upper)
+        if np.array_equal(there, place):  # at its bounds
+            break
         trial = _moved(fit, model, there)
         found = counted.residual(trial)
         if not np.isfinite(found).any():
