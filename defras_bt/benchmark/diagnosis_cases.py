@@ -19,7 +19,7 @@ _ARM: Mapping[str, Callable[[np.random.Generator], Extension]] = {
     "servo_lag@q1": lambda rng: {"servo_lag": {"q1_s": rng.uniform(0.03, 0.08)}},
     "servo_lag@q2": lambda rng: {"servo_lag": {"q2_s": rng.uniform(0.03, 0.08)}},
     "joint_offset@q4": lambda rng: {"joint_offset": {"q4_rad": rng.uniform(0.03, 0.1)}},
-    "joint_coupling@q6<-q4,q5": lambda rng: {
+    "joint_coupling@q6<-q4,q5,q6": lambda rng: {
         "joint_coupling": {
             "q6_from_q4": rng.uniform(0.08, 0.2),
             "q6_from_q5": rng.uniform(0.08, 0.2),

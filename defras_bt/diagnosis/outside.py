@@ -34,12 +34,16 @@ def left_over(
     """Examine ``residual`` (n,), whose noise was estimated as ``noise``.
 
     The mean square of a sensor, or of one of its channels, must exceed its scatter by more than
-    95 % of surrogates vary (of channels: the one that varies most), and by more than the floor
-    squared; and its own past must predict a part.
+    surrogates vary (of channels: the one that varies most), and by more than the floor squared;
+    and its own past must predict a part. By chance that happens to any of all sensors in 5 %
+    (Sidak 1967).
     """
     drawn = np.concatenate(list(surrogates(noise, residual, count, rng)), axis=1)
     sensors = []
-    for sensor in dict.fromkeys(c.sensor for c in samples.channels):
+    names = [c.sensor for c in samples.channels]
+    tests = sum(1 if names.count(sensor) == 1 else 2 for sensor in dict.fromkeys(names))
+    chance = _CHANCE ** (1.0 / tests)
+    for sensor in dict.fromkeys(names):
         own = [i for i, c in enumerate(samples.channels) if c.sensor == sensor]
         rows = [np.flatnonzero((samples.channel == i) & np.isfinite(residual)) for i in own]
         own = [i for i, keep in zip(own, rows, strict=True) if len(keep)]
@@ -52,8 +56,8 @@ def left_over(
         spread = spread / np.maximum(spread.mean(axis=1, keepdims=True), 1e-300)
         scatter = np.array([samples.channels[i].noise_sd ** 2 for i in own])
         floor = np.array([samples.channels[i].floor ** 2 for i in own])
-        largest = float(np.quantile(spread.max(axis=0), _CHANCE))
-        together = float(np.quantile(counts @ (scatter[:, None] * spread), _CHANCE))
+        largest = float(np.quantile(spread.max(axis=0), chance))
+        together = float(np.quantile(counts @ (scatter[:, None] * spread), chance))
         whole = counts @ squares > together + counts @ floor
         single = squares > scatter * largest + floor
         conspicuous = own if whole else [i for i, one in zip(own, single, strict=True) if one]

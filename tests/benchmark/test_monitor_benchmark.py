@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,8 +63,16 @@ def test_alarms_without_mismatch_are_counted_once_each_and_told_from_real_differ
 def test_equally_quiet_is_the_lowest_threshold_without_more_alarms() -> None:
     runs = [run(after(12, 9.0), after(5, 3.1), after(10, 7.0))]
     assert as_quiet(runs, "local", 0.0) == pytest.approx(0.00325)
+    assert as_quiet(runs, "local", 0.0, false_only=True) == pytest.approx(0.00325)
+    off = [replace(runs[0], null_gap_m=np.full(FRAMES, 0.004))]
+    assert as_quiet(off, "local", 0.0, false_only=True) == pytest.approx(0.00025)
     tables = monitor_tables(runs)
-    assert [row["metric"] for row in tables["Both metrics"]] == ["median", "local", "local"]
+    assert [row["metric"] for row in tables["Both metrics"]] == [
+        "median",
+        "local",
+        "local",
+        "local",
+    ]
     assert [row["mismatch"] for row in tables["Noticed, by mismatch"]] == ["slip"]
 
 
