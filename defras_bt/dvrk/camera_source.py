@@ -1,0 +1,46 @@
+"""What the executive's world asks of a laboratory's cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from defras_sim.worlds.protocol import CameraImage, PointCloud
+
+
+@dataclass(frozen=True)
+class CameraReadings:
+    """The latest of every camera, in the tissue frame, or None where nothing sound came yet.
+
+    Stamps are those of the messages, in seconds of the clock that stamped them: the world makes
+    its own time of them, and judges their age. A message that must not be used (another frame,
+    other units, a stamp of 0 or one that runs backwards) leaves the last sound reading in its
+    place, which so grows old, and a sentence in ``faults`` by the reading's name: ``cloud``,
+    ``endoscope``.
+    """
+
+    cloud: PointCloud | None = None
+    depth_image: CameraImage | None = None
+    endoscope_image: CameraImage | None = None
+    faults: Mapping[str, str] = field(default_factory=dict)
+
+
+class CameraSource(Protocol):
+    """Cameras of one set-up. Methods may be called from the executive's thread at any time."""
+
+    def latest(self) -> CameraReadings:
+        """The newest readings; never waits."""
+
+    def close(self) -> None:
+        """Listen no more."""
+
+
+class NoCameras:
+    """A set-up without cameras, for trials of the arms alone: guards find the cloud missing."""
+
+    def latest(self) -> CameraReadings:
+        return CameraReadings()
+
+    def close(self) -> None:
+        pass
