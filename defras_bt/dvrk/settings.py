@@ -30,6 +30,7 @@ from defras_sim.yaml_source import read_yaml
 
 Port = Annotated[int, Field(ge=1024, le=65535)]
 Seconds = Annotated[float, Field(gt=0, le=10)]
+_PORTS: dict[ArmName, int] = {"psm1": 48051, "psm2": 48052}
 
 
 class Ros1Transport(Part):
@@ -52,7 +53,7 @@ class SocketTransport(Part):
 
     kind: Literal["socket"] = "socket"
     own_address: str = "127.0.0.1"
-    ports: dict[ArmName, Port] = Field(default_factory=lambda: {"psm1": 48051, "psm2": 48052})
+    ports: dict[ArmName, Port] = Field(default_factory=lambda: dict(_PORTS))
 
 
 Transport = Annotated[Ros1Transport | Ros2Transport | SocketTransport, Field(discriminator="kind")]

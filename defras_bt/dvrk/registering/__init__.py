@@ -1,0 +1,1 @@
+"""From touched or seen landmarks to where arms and cameras stand."""
