@@ -18,11 +18,16 @@ class CameraReadings:
     other units, a stamp of 0 or one that runs backwards) leaves the last sound reading in its
     place, which so grows old, and a sentence in ``faults`` by the reading's name: ``cloud``,
     ``endoscope``.
+
+    ``roi_visibility`` is judged with the laboratory's own colours, from the picture whose stamp it
+    has. What is given here ready-made, cloud or visibility, the executive does not make again.
     """
 
     cloud: PointCloud | None = None
     depth_image: CameraImage | None = None
     endoscope_image: CameraImage | None = None
+    roi_visibility: float | None = None
+    roi_visibility_stamp_s: float | None = None
     faults: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -31,6 +36,9 @@ class CameraSource(Protocol):
 
     def latest(self) -> CameraReadings:
         """The newest readings; never waits."""
+
+    def now_s(self) -> float:
+        """The time on the clock that stamps the messages."""
 
     def close(self) -> None:
         """Listen no more."""
@@ -41,6 +49,9 @@ class NoCameras:
 
     def latest(self) -> CameraReadings:
         return CameraReadings()
+
+    def now_s(self) -> float:
+        return 0.0
 
     def close(self) -> None:
         pass
