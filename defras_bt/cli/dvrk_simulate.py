@@ -1,0 +1,83 @@
+"""``defras dvrk simulate``: stand in for a dVRK."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, get_args
+
+import typer
+from rich.console import Console
+
+from defras_bt.cli.errors import UserError
+from defras_bt.cli.files import find_scene
+from defras_bt.dvrk.ros_packages import RosMissing
+from defras_bt.dvrk.stand_in.imperfections import read_imperfections
+from defras_bt.dvrk.stand_in.patient_process import WorldName
+from defras_bt.dvrk.stand_in.ros_node import NoMaster
+from defras_bt.dvrk.stand_in.stand_in import Clock, StandIn, StandInOrder
+
+
+def simulate(
+    scene: Annotated[str, typer.Argument(help="Scene as believed: a file, or a shipped name.")],
+    actual: Annotated[
+        str | None, typer.Option(help="Scene as it really is; default: as believed.")
+    ] = None,
+    world: Annotated[str, typer.Option(help="bullet (PyBullet) or model (fast).")] = "bullet",
+    imperfections: Annotated[
+        str, typer.Option(help="Of arms and cameras: lab (as measured), none, or a file.")
+    ] = "lab",
+    seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
+    master: Annotated[str | None, typer.Option(help="URI of the ROS master.")] = None,
+    port: Annotated[int, typer.Option(min=1024, max=65535, help="Of a master here.")] = 11311,
+    clock: Annotated[
+        str | None,
+        typer.Option(help="real, or simulated (/clock); default: real for model worlds."),
+    ] = None,
+    speed: Annotated[
+        float, typer.Option(min=0.01, max=10, help="Of a simulated clock, at most.")
+    ] = 1.0,
+) -> None:
+    """Stand in for a dVRK: two PSMs and their cameras over a real ROS 1 master.
+
+    It speaks CRTK as a dVRK does and ends with Ctrl-C. Exit code: 0 ended by the user, 2 no master
+    or invalid input, 1 the patient's world could not go on.
+
+    Example: roscore -p 11500 & defras dvrk simulate demo --actual demo_actual --port 11500
+    """
+    console = Console(soft_wrap=True, highlight=False)
+    _, believed = find_scene(scene)
+    truth = believed if actual is None else find_scene(actual)[1]
+    if world not in get_args(WorldName):
+        raise UserError(f"--world {world}: valid are {', '.join(get_args(WorldName))}")
+    chosen = clock or ("real" if world == "model" else "simulated")
+    if chosen not in get_args(Clock):
+        raise UserError(f"--clock {chosen}: valid are {', '.join(get_args(Clock))}")
+    if imperfections not in ("lab", "none") and not Path(imperfections).is_file():
+        raise UserError(f"--imperfections {imperfections}: valid are lab, none, or a file")
+    order = StandInOrder(
+        actual=truth,
+        world="bullet" if world == "bullet" else "model",
+        imperfections=read_imperfections(imperfections),
+        seed=seed,
+        master_uri=master or f"http://localhost:{port}",
+        clock="real" if chosen == "real" else "simulated",
+        speed=speed,
+    )
+    try:
+        stand_in = StandIn(order, lambda what: console.print(what, style="yellow", markup=False))
+    except (NoMaster, RosMissing) as error:
+        raise UserError(str(error)) from error
+
+    def end(_signal: int, _frame: FrameType | None) -> None:
+        stand_in.stop()
+
+    for ending in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(ending, end)
+    console.print(
+        f"Standing in for a dVRK at {order.master_uri}: {', '.join(truth.arms)} and two cameras, "
+        f"{world} world, {chosen} clock, imperfections: {imperfections}. Ctrl-C ends it.",
+        markup=False,
+    )
+    stand_in.run()

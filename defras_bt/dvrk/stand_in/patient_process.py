@@ -1,0 +1,169 @@
+"""The patient and the cameras in a process of their own.
+
+A world's step and its pictures take tens of milliseconds, during which nothing else in the process
+gets on. The arms tell it where their tips are, tick by tick, and hear what the tissue does to them.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Mapping
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any, Literal
+
+import numpy as np
+
+from defras_bt.dvrk.stand_in.camera_topics import CameraTopics
+from defras_bt.dvrk.stand_in.imperfections import Imperfections
+from defras_bt.dvrk.stand_in.patient import ArmFeedback, Patient, TipTarget, patient_scene
+from defras_bt.dvrk.stand_in.ros_node import join
+from defras_bt.executive.operation import make_world
+from defras_sim.geometry import Pose
+from defras_sim.scene import Scene
+from defras_sim.worlds.error import WorldError
+
+NODE = "defras_patient"
+_LOADING_S = 120.0
+
+WorldName = Literal["model", "bullet"]
+
+
+class PatientLost(RuntimeError):
+    """The patient's process ended; the message says why."""
+
+
+@dataclass(frozen=True)
+class PatientOrder:
+    """What the patient's process starts from."""
+
+    actual: Scene
+    world: WorldName
+    tick_s: float
+    imperfections: Imperfections
+    seed: int
+    master_uri: str
+    simulated_clock: bool
+    tips: Mapping[str, Pose]
+    """tissue_from_tip of every arm at the start."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where the tips are at the end of tick ``tick``, counted from 1."""
+
+    tick: int
+    arms: Mapping[str, TipTarget]
+
+
+@dataclass(frozen=True)
+class Felt:
+    """What the tissue does to the arms after tick ``tick``; ``error`` says why no more comes."""
+
+    tick: int
+    arms: Mapping[str, ArmFeedback]
+    error: str = ""
+
+
+class PatientProcess:
+    """The arms' end of the line to the patient."""
+
+    def __init__(self, order: PatientOrder) -> None:
+        """Start it, and wait until the tissue lies there.
+
+        Raises:
+            PatientLost: it does not come up.
+        """
+        context = multiprocessing.get_context("spawn")
+        self._line, theirs = context.Pipe()
+        self._process = context.Process(target=_live, args=(order, theirs), daemon=True)
+        self._process.start()
+        theirs.close()
+        self.tick = -1
+        """The last tick that the patient ended."""
+        self.felt: Mapping[str, ArmFeedback] = {}
+        if not self._line.poll(_LOADING_S):
+            self.close()
+            raise PatientLost(f"the patient was not ready within {_LOADING_S:g} s")
+        self.hear()
+
+    def begin(self, start_s: float) -> None:
+        """World time 0 is ``start_s`` of ROS time; it is now.
+
+        Raises:
+            PatientLost: the process is gone.
+        """
+        self._send(start_s)
+
+    def tell(self, motion: Motion) -> None:
+        """Let one more tick pass for the patient.
+
+        Raises:
+            PatientLost: its process is gone.
+        """
+        self._send(motion)
+
+    def _send(self, what: Motion | float) -> None:
+        try:
+            self._line.send(what)
+        except OSError as error:
+            raise PatientLost(f"the patient's process is gone: {error}") from error
+
+    def hear(self, within_s: float = 0.0) -> bool:
+        """Take what has come, waiting for the first of it at most ``within_s``; whether any did.
+
+        Raises:
+            PatientLost: its world cannot go on, or its process is gone.
+        """
+        heard = False
+        try:
+            while self._line.poll(0.0 if heard else within_s):
+                felt: Felt = self._line.recv()
+                if felt.error:
+                    raise PatientLost(felt.error)
+                self.tick, self.felt, heard = felt.tick, felt.arms, True
+        except (EOFError, OSError) as error:
+            raise PatientLost("the patient's process ended without a word") from error
+        return heard
+
+    def close(self) -> None:
+        """End the process; it ends by itself when this one does."""
+        self._line.close()
+        self._process.join(2.0)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+
+
+def _live(order: PatientOrder, line: Connection) -> None:
+    """The patient's process."""
+    # Ctrl-C is for the process that commands this one; its end of the line then closes.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    rospy: Any = None
+    try:
+        rospy = join(order.master_uri, NODE, simulated_clock=order.simulated_clock)
+        cameras = CameraTopics(rospy)
+        patient = _patient(order)
+        patient.start_at(order.tips)
+        line.send(Felt(0, patient.feedback()))
+        start_s: float = line.recv()
+        cameras.publish(patient.pictures(), start_s)
+        while True:
+            motion: Motion = line.recv()
+            line.send(Felt(motion.tick, patient.step(motion.arms)))
+            cameras.publish(patient.pictures(), start_s)
+    except (EOFError, BrokenPipeError):
+        pass  # the arms are gone, and with them the operation
+    except WorldError as error:
+        line.send(Felt(0, {}, f"the patient's world cannot go on: {error}"))
+    finally:
+        if rospy is not None:
+            rospy.signal_shutdown("the stand-in ends")
+
+
+def _patient(order: PatientOrder) -> Patient:
+    world_rng, camera_rng = np.random.default_rng(order.seed).spawn(2)
+    actual = order.imperfections.seen_by(order.actual)
+    world = make_world(order.world, patient_scene(actual, order.tick_s), world_rng)
+    return Patient(world, actual, order.imperfections, camera_rng)
