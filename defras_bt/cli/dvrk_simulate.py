@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
 from typing import Annotated, get_args
@@ -13,10 +14,12 @@ from rich.console import Console
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import find_scene
 from defras_bt.dvrk.ros_packages import RosMissing
+from defras_bt.dvrk.stand_in.faults import read_faults
 from defras_bt.dvrk.stand_in.imperfections import read_imperfections
-from defras_bt.dvrk.stand_in.patient_process import WorldName
-from defras_bt.dvrk.stand_in.ros_node import NoMaster
-from defras_bt.dvrk.stand_in.stand_in import Clock, StandIn, StandInOrder
+from defras_bt.dvrk.stand_in.order import Clock, StandInOrder, WorldName
+from defras_bt.dvrk.stand_in.set_up import registration_of, set_up_of, write_set_up
+from defras_bt.dvrk.stand_in.stand_in import StandIn
+from defras_bt.dvrk.transport.transport import ConnectionFailed
 
 
 def simulate(
@@ -38,6 +41,14 @@ def simulate(
     speed: Annotated[
         float, typer.Option(min=0.01, max=10, help="Of a simulated clock, at most.")
     ] = 1.0,
+    faults: Annotated[Path | None, typer.Option(help="What goes wrong, and when: a file.")] = None,
+    witness: Annotated[
+        Path | None, typer.Option(help="File for what really happened, for those who judge.")
+    ] = None,
+    set_up: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the set-up and registration files that reach it."),
+    ] = None,
 ) -> None:
     """Stand in for a dVRK: two PSMs and their cameras over a real ROS 1 master.
 
@@ -64,10 +75,17 @@ def simulate(
         master_uri=master or f"http://localhost:{port}",
         clock="real" if chosen == "real" else "simulated",
         speed=speed,
+        faults=read_faults(faults) if faults is not None else (),
+        witness=witness,
     )
+    if set_up is not None:
+        measured = datetime.now(UTC).replace(microsecond=0)
+        registration = registration_of(believed, order.imperfections, measured)
+        file = write_set_up(set_up, set_up_of(order.master_uri, believed), registration)
+        console.print(f"It is reached with --setup {file}", markup=False)
     try:
         stand_in = StandIn(order, lambda what: console.print(what, style="yellow", markup=False))
-    except (NoMaster, RosMissing) as error:
+    except (ConnectionFailed, RosMissing) as error:
         raise UserError(str(error)) from error
 
     def end(_signal: int, _frame: FrameType | None) -> None:

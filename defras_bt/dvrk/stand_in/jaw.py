@@ -22,7 +22,7 @@ class Jaw:
         """Told by whoever knows the tissue."""
         self.busy = False
         """A jaw move is under way."""
-        self._goal_rad = angle_rad
+        self.goal_rad = angle_rad
 
     def go_to(self, goal_rad: float, *, as_move: bool) -> None:
         """Turn to ``goal_rad``; a move makes the arm busy until it is there.
@@ -35,17 +35,17 @@ class Jaw:
                 f"jaw goal {goal_rad:.3f} rad refused: this jaw goes from {LOWEST_RAD} to "
                 f"{HIGHEST_RAD} rad"
             )
-        self._goal_rad = goal_rad
+        self.goal_rad = goal_rad
         self.busy = as_move
 
     def hold(self) -> None:
         """Stay; what is held is held on to."""
-        self._goal_rad = self.setpoint_rad
+        self.goal_rad = self.setpoint_rad
         self.busy = False
 
     def advance(self, time_s: float, ratio: float) -> None:
         """Let ``time_s`` pass; moves are slowed by ``ratio`` (0..1), servo goals are not."""
         most_rad = JAW_SPEED_RAD_S * time_s * (ratio if self.busy else 1.0)
-        self.setpoint_rad += float(np.clip(self._goal_rad - self.setpoint_rad, -most_rad, most_rad))
-        if abs(self._goal_rad - self.setpoint_rad) < _THERE_RAD:
+        self.setpoint_rad += float(np.clip(self.goal_rad - self.setpoint_rad, -most_rad, most_rad))
+        if abs(self.goal_rad - self.setpoint_rad) < _THERE_RAD:
             self.busy = False

@@ -25,6 +25,9 @@ class Pace(Protocol):
     def now_s(self) -> float:
         """World time."""
 
+    def ros_s(self) -> float:
+        """ROS time."""
+
     def next_period_s(self) -> float:
         """Wait for the next period; how much world time has passed since the last one."""
 
@@ -41,6 +44,9 @@ class RealPace:
 
     def now_s(self) -> float:
         return monotonic() - self._begin_s
+
+    def ros_s(self) -> float:
+        return self.start_s + self.now_s()
 
     def next_period_s(self) -> float:
         # Periods missed altogether are not made up for.
@@ -68,6 +74,9 @@ class SimulatedPace:
 
     def now_s(self) -> float:
         return self._periods * self._period_s
+
+    def ros_s(self) -> float:
+        return self.start_s + self.now_s()
 
     def next_period_s(self) -> float:
         self._due_s = max(self._due_s + self._wall_period_s, monotonic() - self._wall_period_s)

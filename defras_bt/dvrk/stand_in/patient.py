@@ -84,6 +84,11 @@ class Patient:
         self._late = LateReadings[CameraImage](layers.delay_s, _restamped)
         self._eyes: dict[str, RayPictures] = {}
 
+    @property
+    def time_s(self) -> float:
+        """World time."""
+        return self._clock.time_s
+
     def start_at(self, tips: Mapping[str, Pose]) -> None:
         """Where the tips (tissue_from_tip) count as being when the first tick begins."""
         self._at = dict(tips)

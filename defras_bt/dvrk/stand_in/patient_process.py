@@ -11,23 +11,24 @@ import signal
 from collections.abc import Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from defras_bt.dvrk.stand_in.camera_topics import CameraTopics
-from defras_bt.dvrk.stand_in.imperfections import Imperfections
+from defras_bt.dvrk.stand_in.delivery import Delivery
+from defras_bt.dvrk.stand_in.fault_topic import take_orders
+from defras_bt.dvrk.stand_in.faults import Source
+from defras_bt.dvrk.stand_in.menu import Menu
+from defras_bt.dvrk.stand_in.order import WORLD_TICK_S, StandInOrder
 from defras_bt.dvrk.stand_in.patient import ArmFeedback, Patient, TipTarget, patient_scene
 from defras_bt.dvrk.stand_in.ros_node import join
 from defras_bt.executive.operation import make_world
 from defras_sim.geometry import Pose
-from defras_sim.scene import Scene
 from defras_sim.worlds.error import WorldError
 
 NODE = "defras_patient"
 _LOADING_S = 120.0
-
-WorldName = Literal["model", "bullet"]
 
 
 class PatientLost(RuntimeError):
@@ -36,17 +37,10 @@ class PatientLost(RuntimeError):
 
 @dataclass(frozen=True)
 class PatientOrder:
-    """What the patient's process starts from."""
+    """What the patient's process starts from; ``tips``: tissue_from_tip of every arm then."""
 
-    actual: Scene
-    world: WorldName
-    tick_s: float
-    imperfections: Imperfections
-    seed: int
-    master_uri: str
-    simulated_clock: bool
+    stand_in: StandInOrder
     tips: Mapping[str, Pose]
-    """tissue_from_tip of every arm at the start."""
 
 
 @dataclass(frozen=True)
@@ -142,17 +136,27 @@ def _live(order: PatientOrder, line: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     rospy: Any = None
     try:
-        rospy = join(order.master_uri, NODE, simulated_clock=order.simulated_clock)
-        cameras = CameraTopics(rospy)
-        patient = _patient(order)
+        whole = order.stand_in
+        rospy = join(whole.master_uri, NODE, simulated_clock=whole.simulated_clock)
+        world_rng, camera_rng, delivery_rng = np.random.default_rng([whole.seed, 2]).spawn(3)
+        actual = whole.imperfections.seen_by(whole.actual)
+        world = make_world(whole.world, patient_scene(actual, WORLD_TICK_S), world_rng)
+        patient = Patient(world, actual, whole.imperfections, camera_rng)
         patient.start_at(order.tips)
         line.send(Felt(0, patient.feedback()))
         start_s: float = line.recv()
-        cameras.publish(patient.pictures(), start_s)
+        menu = Menu(whole.faults)
+        delay_s = whole.imperfections.transport_delay_s
+        delays: dict[Source, float] = {"cloud": delay_s, "endoscope": delay_s}
+        delivery = Delivery(menu, delivery_rng, start_s, delays)
+        cameras = CameraTopics(rospy, delivery, menu)
+        take_orders(rospy, menu, lambda: patient.time_s, lambda _: None)
         while True:
+            menu.turns(patient.time_s)
+            cameras.publish(patient.pictures(), start_s, patient.time_s)
+            delivery.flush(patient.time_s)
             motion: Motion = line.recv()
             line.send(Felt(motion.tick, patient.step(motion.arms)))
-            cameras.publish(patient.pictures(), start_s)
     except (EOFError, BrokenPipeError):
         pass  # the arms are gone, and with them the operation
     except WorldError as error:
@@ -160,10 +164,3 @@ def _live(order: PatientOrder, line: Connection) -> None:
     finally:
         if rospy is not None:
             rospy.signal_shutdown("the stand-in ends")
-
-
-def _patient(order: PatientOrder) -> Patient:
-    world_rng, camera_rng = np.random.default_rng(order.seed).spawn(2)
-    actual = order.imperfections.seen_by(order.actual)
-    world = make_world(order.world, patient_scene(actual, order.tick_s), world_rng)
-    return Patient(world, actual, order.imperfections, camera_rng)

@@ -6,11 +6,10 @@ remote centre is the base frame. Nothing here reads a clock: :meth:`Psm.advance`
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from defras_bt.dvrk.stand_in.drive import Drive, joints_near
 from defras_bt.dvrk.stand_in.jaw import Jaw
@@ -61,9 +60,11 @@ class Psm:
         jaw_rad: float,
         period_s: float,
         operating: Operating,
+        encoder_noise: Callable[[], Floats] | None = None,
     ) -> None:
         """``rcm_m`` (3,): the true remote centre in the tissue frame. ``period_s``: of
-        :meth:`advance`, and the step within which servo goals must be reached."""
+        :meth:`advance`, and the step within which servo goals must be reached.
+        ``encoder_noise`` gives that of one reading of the joints (6,)."""
         self.name = name
         self.drive = Drive(rcm_m, effects, home_joints)
         self.jaw = Jaw(jaw_rad)
@@ -75,7 +76,8 @@ class Psm:
         self._twist: Floats | None = None
         self._twist_left_s = 0.0
         self._homing_left_s = 0.0
-        self._before = self.drive.encoded
+        self._encoder_noise = encoder_noise
+        self._encoded = self.drive.encoded
         self._speeds = np.zeros(6)
 
     def state_command(self, command: str) -> None:
@@ -171,12 +173,14 @@ class Psm:
             self._follow_twist(time_s)
         self.jaw.advance(time_s, self.ratio)
         self.drive.follow(self._setpoint, time_s)
-        self._speeds = (self.drive.encoded - self._before) / time_s
-        self._before = self.drive.encoded
+        before, self._encoded = self._encoded, self.drive.encoded
+        if self._encoder_noise is not None:
+            self._encoded = self._encoded + self._encoder_noise()
+        self._speeds = (self._encoded - before) / time_s
 
     def reading(self) -> PsmReading:
         """What is to be published now."""
-        joints = self.drive.encoded
+        joints = self._encoded
         measured, setpoint = _reported(joints), _reported(self._setpoint)
         twist = jacobian(joints) @ self._speeds
         # The Jacobian is that of the tip.
@@ -185,7 +189,7 @@ class Psm:
         busy = self._path is not None or self.jaw.busy or self._homing_left_s > 0.0
         return PsmReading(
             operating=replace(self.operating, is_busy=busy),
-            measured_joints=joints,
+            measured_joints=joints.copy(),
             measured_speeds=self._speeds.copy(),
             setpoint_joints=self._setpoint.copy(),
             measured=measured,
@@ -253,8 +257,3 @@ class Psm:
 def _reported(joints: Floats) -> Pose:
     """base_from_reported for joints (6,)."""
     return tip_pose(joints) @ REPORTED_FROM_TIP.inverse()
-
-
-def turned_by(before: Pose, after: Pose) -> Floats:
-    """The rotation vector (3,) that turns one pose into the other, in their parent frame."""
-    return np.asarray(Rotation.from_matrix(after.rotation @ before.rotation.T).as_rotvec())
