@@ -1,0 +1,13 @@
+"""``defras dvrk``: everything about a da Vinci Research Kit but operating on it."""
+
+from __future__ import annotations
+
+import typer
+
+from defras_bt.cli.dvrk_simulate import simulate
+
+app = typer.Typer(
+    no_args_is_help=True,
+    help="The da Vinci Research Kit: set-up, registration, check, and a stand-in for it.",
+)
+app.command("simulate")(simulate)
