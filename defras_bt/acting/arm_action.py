@@ -50,7 +50,7 @@ class ArmAction(Node):
     @property
     def setpoint_m(self) -> Floats:
         """Where the tip was last told to be (3,), tissue frame."""
-        return self.observed.setpoint_tissue_from_tip.position_m
+        return self.observed.commanded_tissue_from_tip.position_m
 
     @property
     def elapsed_s(self) -> float:

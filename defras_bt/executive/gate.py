@@ -130,7 +130,7 @@ class CommandGate:
                 faults.append(f"the command for {name} has not three components")
             elif not command.is_finite:
                 faults.append(f"the command for {name} is not a number")
-            elif not all(map(isfinite, observed.setpoint_tissue_from_tip.position_m.tolist())):
+            elif not all(map(isfinite, observed.commanded_tissue_from_tip.position_m.tolist())):
                 faults.append(f"the set-point of {name} is not a number")
         return faults
 
@@ -156,7 +156,7 @@ class CommandGate:
         self, name: str, command: ArmCommand, observed: ArmObservation
     ) -> tuple[ArmCommand, str]:
         """The part of a command that keeps workspace and joint limits; why nothing is left."""
-        tick_s, tip = self._scene.tick_s, observed.setpoint_tissue_from_tip
+        tick_s, tip = self._scene.tick_s, observed.commanded_tissue_from_tip
         start = tip.position_m
         # Outside the workspace only motion back into it is let through.
         low_m, high_m = np.minimum(start, self._low_m), np.maximum(start, self._high_m)

@@ -56,6 +56,7 @@ class Perception:
             **self._standstill(sensed.time_s),
             **self._arms.faults(sensed, driven_by_hand=operator.mode is Mode.TAKEN_OVER),
             **stale(sensed, scene),
+            **sensed.stopped,
         }
         if self._grips.update(sensed, unsound=missing):
             self._touched = True

@@ -76,6 +76,7 @@ def read_input(text: str, clouds: Sequence[Floats]) -> TickInput:
         cloud=None if seen is None else PointCloud(seen["stamp_s"], clouds[seen["number"]]),
         roi_visibility=content.get("roi_visibility"),
         roi_visibility_stamp_s=content.get("roi_visibility_stamp_s"),
+        stopped=content.get("stopped", {}),
         faults=tuple(content.get("faults", ())),
         dropped_points=content.get("dropped_points", 0),
     )
@@ -91,6 +92,8 @@ def _observed(seen: Observation, cloud: int | None) -> Mapping[str, Any]:
     if seen.roi_visibility is not None:
         said["roi_visibility"] = seen.roi_visibility
         said["roi_visibility_stamp_s"] = seen.roi_visibility_stamp_s
+    if seen.stopped:
+        said["stopped"] = dict(seen.stopped)
     if isinstance(seen, SensedObservation) and (seen.faults or seen.dropped_points):
         said |= {"faults": seen.faults, "dropped_points": seen.dropped_points}
     return said
@@ -111,6 +114,8 @@ def _arm(arm: ArmObservation) -> Mapping[str, Any]:
     ):
         if numbers is not None:
             said[name] = numbers.tolist()
+    if arm.goal_tissue_from_tip is not None:
+        said["goal"] = _pose(arm.goal_tissue_from_tip)
     return said
 
 
@@ -124,6 +129,7 @@ def _read_arm(said: Mapping[str, Any]) -> ArmObservation:
         joints=np.array(said["joints"]) if "joints" in said else None,
         setpoint_joints=np.array(said["setpoint_joints"]) if "setpoint_joints" in said else None,
         force_n=np.array(said["force_n"]) if "force_n" in said else None,
+        goal_tissue_from_tip=_read_pose(said["goal"]) if "goal" in said else None,
     )
 
 

@@ -26,7 +26,7 @@ class ArmPlausibility:
     where it was lost: where it really is, nobody knows. A set-point that does not go where the
     commands lead is unsound until it is there: either the arm does not hear, or its driver repeats
     an old message as if it were new while the arm moves on. After the operator drove the arms
-    themselves, where they stand is believed anew.
+    themselves, or the world itself stopped one, where its set-point stands is believed anew.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -54,7 +54,8 @@ class ArmPlausibility:
             away_m = _distance_m(
                 arm.tissue_from_tip.position_m, arm.setpoint_tissue_from_tip.position_m
             )
-            if driven_by_hand or away_m > FOLLOWING_M:
+            stopped = driven_by_hand or name in observation.stopped
+            if stopped or away_m > FOLLOWING_M:
                 # A driver may take the set-point back to a tip that was held up.
                 self._reckoned[name].forget()
                 strayed_m = 0.0

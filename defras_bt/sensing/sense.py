@@ -55,6 +55,7 @@ def sense(
         endoscope_image=observation.endoscope_image,
         roi_visibility=share,
         roi_visibility_stamp_s=stamp_s,
+        stopped=observation.stopped,
         faults=tuple(fault for fault in (unseen, unmeasured) if fault),
         dropped_points=dropped,
     )

@@ -158,6 +158,13 @@ class TestWithoutTrip:
         assert speed_m_s(check(go(0.01 * UP), 1.0, outside).command) == 0.0
         assert speed_m_s(check(go(-0.01 * UP), 1.0, outside).command) == pytest.approx(0.01)
 
+    def test_the_wall_is_where_the_tip_was_last_told_to_be(self):
+        behind = arm((HALF_M - 0.002, 0.03, 0.03))
+        ahead = replace(behind, goal_tissue_from_tip=arm((HALF_M, 0.03, 0.03)).tissue_from_tip)
+        away = go(np.array([0.01, 0.0, 0.0]))
+        assert speed_m_s(check(away, 1.0, inputs({"psm1": behind})).command) > 0.0
+        assert speed_m_s(check(away, 1.0, inputs({"psm1": ahead})).command) == 0.0
+
     def test_outside_in_one_axis_motion_along_the_others_is_free(self):
         outside = inputs({"psm1": arm((0.0, 0.0, ABOVE_TISSUE_M + 0.01))})
         verdict = check(go([0.01, 0.0, 0.01]), 1.0, outside)

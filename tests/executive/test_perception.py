@@ -189,6 +189,14 @@ class TestUnlikelyReadings:
         assert late.missing == ()
         assert late.observation.arms == seen.observation.arms
 
+    def test_what_a_world_says_that_it_stopped_is_missing_for_as_long(self, senses):
+        why = "PSM1: is PAUSED; only an arm that is ENABLED moves"
+        world = senses.bench.world
+        stopped = replace(world.observe(), stopped={"psm1": why})
+        assert senses.perception.update(0, stopped).missing == (why,)
+        world.step()
+        assert senses.look().missing == ()
+
 
 class TestGrips:
     """A grip begins and ends with what the jaw says."""

@@ -31,6 +31,9 @@ def told(rng: np.random.Generator, time_s: float) -> SensedObservation:
         joints=None if rng.random() < 0.5 else rng.normal(size=6),
         setpoint_joints=rng.normal(size=6),
         force_n=None if rng.random() < 0.5 else rng.normal(size=3),
+        goal_tissue_from_tip=None
+        if rng.random() < 0.5
+        else Pose(rng.normal(size=3), Rotation.random(rng=rng).as_matrix()),
     )
     points = rng.normal(size=(30, 3)).astype(np.float32).astype(float)
     return SensedObservation(
@@ -41,6 +44,7 @@ def told(rng: np.random.Generator, time_s: float) -> SensedObservation:
         roi_visibility_stamp_s=time_s - 0.1,
         faults=("no cloud: too few points",) if rng.random() < 0.3 else (),
         dropped_points=int(rng.integers(3)),
+        stopped={"psm1": "PSM1: is PAUSED"} if rng.random() < 0.3 else {},
     )
 
 

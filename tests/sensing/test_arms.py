@@ -42,6 +42,20 @@ def check() -> ArmPlausibility:
     return ArmPlausibility(SCENE)
 
 
+def test_an_arm_that_its_world_stopped_is_believed_where_it_stands(check) -> None:
+    stopped_m = 0.0
+    assert faults(check, 0.0, stopped_m) == ""
+    for tick in range(6):
+        go(check, 0.05 * tick)
+    at = Pose(np.array([stopped_m, 0.0, 0.0]))
+    arm = ArmObservation(0.3, at, at, 0.0)
+    unsaid = check.faults(Observation(0.3, {"psm1": arm}), driven_by_hand=False)
+    assert "does not follow" in unsaid["psm1"]
+    said = Observation(0.35, {"psm1": arm}, stopped={"psm1": "it is PAUSED"})
+    check.faults(said, driven_by_hand=False)
+    assert faults(check, 0.4, stopped_m) == ""
+
+
 def test_full_speed_is_believed_also_over_a_gap_in_the_messages(check) -> None:
     for tick in range(12):
         go(check, 0.05 * tick)

@@ -24,7 +24,8 @@ class ArmObservation:
     ``joints`` and ``setpoint_joints`` (6,): yaw, pitch [rad], insertion [m], roll, wrist pitch,
     wrist yaw [rad]; None for a world without joints. ``grasped`` is None where nothing tells.
     ``force_n`` (3,) is what a force sensor says that the jaw exerts on the tissue, None without
-    one; it is recorded, and nothing is decided by it.
+    one; it is recorded, and nothing is decided by it. ``goal_tissue_from_tip`` is where commands
+    lead, where that is ahead of the set-point; None where a set-point is there when a tick ends.
     """
 
     stamp_s: float
@@ -35,6 +36,13 @@ class ArmObservation:
     joints: Floats | None = None
     setpoint_joints: Floats | None = None
     force_n: Floats | None = None
+    goal_tissue_from_tip: Pose | None = None
+
+    @property
+    def commanded_tissue_from_tip(self) -> Pose:
+        """Where the tip was last told to be: new commands go on from there."""
+        goal = self.goal_tissue_from_tip
+        return self.setpoint_tissue_from_tip if goal is None else goal
 
 
 @dataclass(frozen=True)
@@ -64,6 +72,9 @@ class CameraImage:
 class Observation:
     """Everything sensed at one tick. A world fills in what it has; the rest is None.
 
+    ``stopped`` says in sentences, by arm or reading, what a world itself knows to be no ground to
+    act on: an arm that is switched off, a camera in another frame.
+
     ``cloud`` and ``roi_visibility`` come ready-made only from worlds without pictures; from
     pictures, sensing makes them.
     """
@@ -75,6 +86,7 @@ class Observation:
     endoscope_image: CameraImage | None = None
     roi_visibility: float | None = None
     roi_visibility_stamp_s: float | None = None
+    stopped: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
