@@ -10,6 +10,8 @@ from defras_sim.geometry import Floats
 JOINT_ACCELERATION = np.array([np.pi / 2, np.pi / 2, 0.2, 4 * np.pi, 4 * np.pi, 4 * np.pi])
 """rad/s2; m/s2 of the insertion. saw-intuitive-research-kit, ``share/kinematic/PSM.json``."""
 
+_NEARLY_THERE = 1e-6
+
 
 class JointPath:
     """A straight way in joint space, begun and ended at rest, that can be slowed on the way."""
@@ -34,14 +36,13 @@ class JointPath:
         """Where the joints are (n,) after ``time_s`` more, at ``ratio`` (0..1) of their speeds."""
         left = 1.0 - self._share
         if left > 0.0:
-            braking = float(np.sqrt(2.0 * self._acceleration * left))
-            faster = self._share_per_s + self._acceleration * time_s
-            slower = self._share_per_s - self._acceleration * time_s
-            wanted = min(faster, ratio * self._speed, braking)
-            self._share_per_s = max(wanted, min(slower, braking), 0.0)
+            step = self._acceleration * time_s
+            # Speeds that fall by one step a period cover v^2 / 2a + v dt / 2 until rest.
+            braking = np.sqrt(step**2 / 4 + 2.0 * self._acceleration * left) - step / 2
+            wanted = min(self._share_per_s + step, ratio * self._speed)
+            self._share_per_s = min(max(wanted, self._share_per_s - step), float(braking))
             self._share += self._share_per_s * time_s
-            # The last step of a braking motion never quite gets there.
-            if 1.0 - self._share < 0.5 * self._acceleration * time_s**2:
+            if 1.0 - self._share < _NEARLY_THERE:
                 self._share = 1.0
         return self._start + self._share * self._way
 

@@ -1,0 +1,128 @@
+"""The stand-in over a real ROS 1 master, as a client of CRTK sees it."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+import numpy as np
+import pytest
+
+from defras_bt.dvrk.cameras.ros1_cameras import Ros1Cameras
+from defras_bt.dvrk.registering.registration import read_registration
+from defras_bt.dvrk.ros_packages import ros_module
+from defras_bt.dvrk.settings import load_setup
+from defras_bt.dvrk.stand_in.fault_topic import FAULT_TOPIC
+from defras_bt.dvrk.transport.crtk_messages import crtk_messages
+from defras_bt.dvrk.transport.ros1_node import join
+from defras_sim.resources import resource
+from defras_sim.scene import load_scene
+
+
+class Ear:
+    """Keeps every message of one topic."""
+
+    def __init__(self, rospy: Any, topic: str, kind: Any) -> None:
+        self.heard: list[Any] = []
+        self._subscriber = rospy.Subscriber(topic, kind, self.heard.append, tcp_nodelay=True)
+
+    def wait(self, what: Callable[[Any], bool] = lambda _: True, within_s: float = 10.0) -> Any:
+        """The first message yet to come that is so."""
+        seen, since_s = len(self.heard), monotonic()
+        while monotonic() - since_s < within_s:
+            fresh = self.heard[seen:]
+            if found := [message for message in fresh if what(message)]:
+                return found[0]
+            sleep(0.005)
+        raise AssertionError(f"nothing of the kind within {within_s} s")
+
+
+def test_arms_cameras_and_faults_as_a_client_meets_them(ros_master, start_stand_in, tmp_path: Path):
+    lab, witness = tmp_path / "lab", tmp_path / "witness.jsonl"
+    quiet = ("--world", "model", "--imperfections", "none")
+    running = start_stand_in("demo", *quiet, "--set-up", str(lab), "--witness", str(witness))
+    setup = load_setup(lab / "dvrk.yaml")
+    registration = read_registration(lab / "registration.yaml")
+    rospy = join(setup.transport, "test")
+    geometry, sensor = ros_module("geometry_msgs.msg"), ros_module("sensor_msgs.msg")
+    std, crtk = ros_module("std_msgs.msg"), crtk_messages()
+    measured = Ear(rospy, "/PSM1/measured_cp", geometry.PoseStamped)
+    setpoint = Ear(rospy, "/PSM1/setpoint_cp", geometry.PoseStamped)
+    state = Ear(rospy, "/PSM1/operating_state", crtk.OperatingState)
+    error = Ear(rospy, "/PSM1/error", crtk.StringStamped)
+    jaw = Ear(rospy, "/PSM1/jaw/measured_js", sensor.JointState)
+
+    def out(topic: str, kind: Any) -> Any:
+        publisher = rospy.Publisher(topic, kind, queue_size=1, tcp_nodelay=True)
+        while publisher.get_num_connections() == 0:
+            sleep(0.01)
+        return publisher
+
+    servo, move_jaw = (
+        out("/PSM1/servo_cp", geometry.PoseStamped),
+        out("/PSM1/jaw/move_jp", sensor.JointState),
+    )
+
+    # Where the scene has the arm at the start, the reported point is, 28.6 mm behind the tip.
+    scene = load_scene(resource("sim/scenes/demo.yaml"))
+    base = registration.arms["psm1"].pose
+    start = measured.wait()
+    expected = np.array(scene.arms["psm1"].home_tip_m) - base.position_m + [0, 0, 0.0286]
+    at = start.pose.position
+    assert [at.x, at.y, at.z] == pytest.approx(expected, abs=1e-6)
+    assert start.header.frame_id == setup.arms["psm1"].frame
+
+    # A goal within a step is the set-point at once; one beyond is refused, in words.
+    goal = setpoint.wait()
+    goal.pose.position.x += 0.0005
+    servo.publish(goal)
+    setpoint.wait(lambda m: abs(m.pose.position.x - goal.pose.position.x) < 1e-9, 2.0)
+    goal.pose.position.x += 0.02
+    servo.publish(goal)
+    assert "one period's motion" in error.wait().string
+
+    # Moves of the jaw raise is_busy; every state is stamped after the one before.
+    move_jaw.publish(sensor.JointState(position=[0.8]))
+    assert state.wait(lambda m: m.is_busy).state == "ENABLED"
+    state.wait(lambda m: not m.is_busy)
+    assert jaw.wait(lambda m: m.position[0] > 0.75).name == ["jaw"]
+    stamps = [m.header.stamp.to_sec() for m in state.heard]
+    assert np.all(np.diff(stamps) > 0)
+
+    # Cloud and visibility as the registration has them.
+    poses = {name: placed.pose for name, placed in registration.cameras.items()}
+    cameras = Ros1Cameras(setup.cameras, poses, scene)
+    since_s = monotonic()
+    while cameras.latest().cloud is None or cameras.latest().roi_visibility is None:
+        assert monotonic() - since_s < 10.0
+        sleep(0.05)
+    readings = cameras.latest()
+    assert np.median(np.abs(readings.cloud.points_m[:, 2])) < 0.0005
+    assert readings.roi_visibility == pytest.approx(0.0, abs=0.02)
+    assert 0.0 <= cameras.now_s() - readings.cloud.stamp_s < 1.0
+    assert readings.faults == {}
+
+    # Faults on order: an arm that is paused moves no more; a cloud in millimetres is not used.
+    faults = out(FAULT_TOPIC, std.String)
+    faults.publish("{fault: paused, arm: psm1, duration_s: 0.5}")
+    state.wait(lambda m: m.state == "PAUSED")
+    servo.publish(setpoint.wait())
+    assert "PAUSED" in error.wait().string
+    state.wait(lambda m: m.state == "ENABLED")
+    faults.publish("{fault: millimetres}")
+    since_s = monotonic()
+    while "millimetres" not in cameras.latest().faults.get("cloud", ""):
+        assert monotonic() - since_s < 10.0
+        sleep(0.05)
+    cameras.close()
+
+    assert running.end() == 0
+    told = [json.loads(line) for line in witness.read_text().splitlines()]
+    goals = [t for t in told if t["event"] == "goal" and t["command"] == "servo_cp"]
+    assert [bool(t.get("refused")) for t in goals] == [False, True, True]
+    assert [t["fault"] for t in told if t["event"] == "fault"] == [
+        "paused",
+        "paused",
+        "millimetres",
+    ]
