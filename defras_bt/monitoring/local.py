@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defras_bt.monitoring.closest import distance_to_triangles_m
+from defras_bt.monitoring.closest import checked, distance_to_triangles_m
 from defras_bt.monitoring.metric import Measurement
-from defras_bt.monitoring.neighbours import worst_median
 from defras_bt.monitoring.seen import SeenSurface
+from defras_bt.monitoring.worst_neighbourhood import worst_median_m
 from defras_sim.geometry import Floats
 
 
@@ -34,14 +34,26 @@ class LocalMetric:
     name: str = "local"
 
     def measure(self, cloud_m: Floats, seen: SeenSurface) -> Measurement:
+        distances = _Distances(cloud_m, seen.corners_m)
         if len(cloud_m) < self.min_neighbours or len(seen.corners_m) == 0:
-            return Measurement(float("nan"), np.full(len(cloud_m), np.nan))
-        distance = distance_to_triangles_m(cloud_m, seen.corners_m)
-        worst, known = worst_median(
-            np.ascontiguousarray(cloud_m),
-            distance,
+            return Measurement(float("nan"), distances)
+        worst_m, known = worst_median_m(
+            *checked(cloud_m, seen.corners_m),
             self.diameter_m / 2,
             self.min_neighbours,
             self.max_neighbours,
         )
-        return Measurement(worst if 2 * known > len(cloud_m) else float("nan"), distance)
+        return Measurement(worst_m if 2 * known > len(cloud_m) else float("nan"), distances)
+
+
+@dataclass(frozen=True)
+class _Distances:
+    """Distances (n,) of a cloud to triangles; NaN where there are none of these."""
+
+    cloud_m: Floats
+    corners_m: Floats
+
+    def __call__(self) -> Floats:
+        if len(self.corners_m) == 0:
+            return np.full(len(self.cloud_m), np.nan)
+        return distance_to_triangles_m(self.cloud_m, self.corners_m)

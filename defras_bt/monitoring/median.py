@@ -24,6 +24,6 @@ class MedianMetric:
 
     def measure(self, cloud_m: Floats, seen: SeenSurface) -> Measurement:
         if len(cloud_m) == 0 or len(seen.samples_m) == 0:
-            return Measurement(float("nan"), np.full(len(cloud_m), np.nan))
-        distance = nearest_m(np.ascontiguousarray(cloud_m), seen.samples_m)
-        return Measurement(float(np.median(distance)), distance)
+            return Measurement(float("nan"), lambda: np.full(len(cloud_m), np.nan))
+        distance_m = nearest_m(np.ascontiguousarray(cloud_m), seen.samples_m)
+        return Measurement(float(np.median(distance_m)), lambda: distance_m)

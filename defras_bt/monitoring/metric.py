@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 from defras_bt.monitoring.seen import SeenSurface
@@ -11,10 +13,18 @@ from defras_sim.geometry import Floats
 
 @dataclass(frozen=True)
 class Measurement:
-    """``value_m``: the disagreement, NaN where it cannot be said; ``per_point_m`` (n,)."""
+    """``value_m``: the disagreement, NaN where it cannot be said.
+
+    ``distances`` makes :attr:`per_point_m`, when somebody wants it.
+    """
 
     value_m: float
-    per_point_m: Floats
+    distances: Callable[[], Floats] = field(repr=False, compare=False)
+
+    @cached_property
+    def per_point_m(self) -> Floats:
+        """The distance at each point of the cloud (n,)."""
+        return self.distances()
 
 
 class Metric(Protocol):

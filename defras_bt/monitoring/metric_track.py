@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
-
-import numpy as np
+from math import inf, isfinite, isnan
 
 from defras_bt.monitoring.rest import MIN_REST_FRAMES, RestCalibration, calibrate_rest
 
@@ -28,14 +27,14 @@ class MetricTrack:
         self._delta_m = delta_m
         self._rest_m: list[float] = []
         self._raw: deque[int] = deque(maxlen=CONFIRMING_FRAMES)
-        self._settling_until_s = -np.inf
+        self._settling_until_s = -inf
         self._rest_trusted = True
         self.calibration: RestCalibration | None = None
         self.mu_m, self.state = float("nan"), 0
 
     def rest(self, value_m: float) -> None:
         """Take note of a value while nothing is wrong; one that is not finite teaches nothing."""
-        if np.isfinite(value_m) and len(self._rest_m) < _MAX_REST_FRAMES:
+        if isfinite(value_m) and len(self._rest_m) < _MAX_REST_FRAMES:
             self._rest_m.append(value_m)
 
     @property
@@ -62,7 +61,7 @@ class MetricTrack:
         if not self._rest_trusted and value_m < self.calibration.mean_m:
             self.calibration = replace(self.calibration, mean_m=value_m)
         self.mu_m = self.calibration.mu_m(value_m)
-        raw = self.state if np.isnan(value_m) else self.calibration.state(self.mu_m)
+        raw = self.state if isnan(value_m) else self.calibration.state(self.mu_m)
         if stamp_s < self._settling_until_s:
             # Tissue and twin agree again: what comes from now on counts.
             self._settling_until_s = stamp_s if raw == 0 else self._settling_until_s

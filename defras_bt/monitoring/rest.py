@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isnan, nan
 
 import numpy as np
 from scipy.stats import chi2
@@ -29,7 +30,7 @@ class RestCalibration:
 
     def mu_m(self, value_m: float) -> float:
         """The monitored discrepancy of a metric's value: never below 0, NaN stays NaN."""
-        return float("nan") if np.isnan(value_m) else max(0.0, value_m - self.mean_m)
+        return nan if isnan(value_m) else max(0.0, value_m - self.mean_m)
 
     def state(self, mu_m: float) -> int:
         """Warning state 0..3: how many thresholds ``mu_m`` exceeds."""

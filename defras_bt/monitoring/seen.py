@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from defras_bt.monitoring.hidden import Optics, Sight, look, seen_places, touched_vertices
+from defras_bt.monitoring.hidden import Optics, look, seen_places, touched_vertices
 from defras_sim.camera.pinhole import intrinsics, tissue_from_camera
 from defras_sim.geometry import Floats
 from defras_sim.scene import Camera
@@ -44,18 +44,21 @@ class SeenSurface:
         """The cloud (s, 3) that a noiseless camera would deliver."""
         return self.sample()
 
+    def prepared(self) -> bool:
+        """Make :attr:`samples_m` now; False if that was still to be done."""
+        if "samples_m" in self.__dict__:
+            return True
+        self.__dict__["samples_m"] = self.sample()
+        return False
+
 
 def seen_surface(surface: Surface, camera: Camera) -> SeenSurface:
     """What ``camera`` sees of ``surface``; everything is empty where it sees nothing."""
     optics = _optics(camera)
     vertices = np.ascontiguousarray(surface.vertices_m)
-    sight = look(vertices, np.ascontiguousarray(surface.triangles), optics)
-    chosen, corners = _chosen(vertices, sight, touched_vertices(sight, _PLACES, optics))
-    return SeenSurface(
-        chosen,
-        corners,
-        lambda: _placed(vertices, sight.triangles, seen_places(sight, _PLACES, optics), _PLACES),
-    )
+    triangles = np.ascontiguousarray(surface.triangles)
+    chosen, corners = _chosen(vertices, triangles, _PLACES, optics)
+    return SeenSurface(chosen, corners, lambda: _samples(vertices, triangles, _PLACES, optics))
 
 
 @lru_cache(maxsize=8)
@@ -67,9 +70,14 @@ def _optics(camera: Camera) -> Optics:
 
 @jit
 def _chosen(
-    vertices_m: Floats, sight: Sight, touched: NDArray[np.bool_]
+    vertices_m: Floats, surface: NDArray[np.int64], places: Floats, optics: Optics
 ) -> tuple[NDArray[np.int64], Floats]:
-    """Triangles that face the eye and have a ``touched`` (n,) vertex, and their corners."""
+    """Triangles that face the eye and have a vertex of a seen one, and their corners.
+
+    All in one compiled call: to hand what :func:`look` found to and fro takes as long as to look.
+    """
+    sight = look(vertices_m, surface, optics)
+    touched = touched_vertices(sight, places, optics)
     facing, triangles = sight.facing, sight.triangles
     chosen, corners, found = np.empty_like(facing), np.empty((len(facing), 3, 3)), 0
     for t in range(len(facing)):
@@ -83,10 +91,12 @@ def _chosen(
 
 
 @jit
-def _placed(
-    vertices_m: Floats, triangles: NDArray[np.int64], seen: NDArray[np.bool_], places: Floats
+def _samples(
+    vertices_m: Floats, surface: NDArray[np.int64], places: Floats, optics: Optics
 ) -> Floats:
-    """Where those of ``places`` (s, 3) are that are ``seen`` (m, s) of ``triangles`` (m, 3)."""
+    """Where those of ``places`` (s, 3) on the triangles that face the eye are that are seen."""
+    sight = look(vertices_m, surface, optics)
+    seen, triangles = seen_places(sight, places, optics), sight.triangles
     samples, count = np.empty((seen.size, 3)), 0
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]

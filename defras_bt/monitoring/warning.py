@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import replace
 
 import numpy as np
 
 from defras_bt.monitoring.local import LocalMetric
 from defras_bt.monitoring.median import MedianMetric
-from defras_bt.monitoring.metric import Metric
+from defras_bt.monitoring.metric import Measurement, Metric
 from defras_bt.monitoring.metric_track import MetricTrack
-from defras_bt.monitoring.reading import MonitorReading
+from defras_bt.monitoring.reading import MonitorReading, nowhere
 from defras_bt.monitoring.rest import RestCalibration
 from defras_bt.monitoring.seen import SeenSurface, seen_surface
 from defras_sim.geometry import Floats
@@ -107,14 +108,28 @@ class WarningMonitor:
             seen = self._seen_of(self._surface_at(cloud.stamp_s))
             late = cloud.stamp_s - self._caught_up_s >= WAITING_S
             wait = not late and bool(self._can_wait)
-            self._waiting = (cloud, seen) if wait else None
+            # What waits already is finished first.
+            self._waiting = (self._waiting or (cloud, seen)) if wait else None
             now = [m for m in self._metrics if not (wait and m.name in self._can_wait)]
-            self._last = self._measured(now, cloud, seen, np.zeros(0))
+            self._last = self._measured(now, cloud, seen)
         elif self._waiting is not None:
-            now = [m for m in self._metrics if m.name in self._can_wait]
-            self._last = self._measured(now, *self._waiting, self._last.per_point_m)
-            self._waiting = None
+            self._last = self._caught_up(*self._waiting, self._last)
         return self._last
+
+    def _caught_up(
+        self, cloud: PointCloud, seen: SeenSurface, last: MonitorReading
+    ) -> MonitorReading:
+        """``last``, completed if the simulated cloud was made already: this tick does one of both.
+
+        No tick has more to do than one that brings a cloud.
+        """
+        if not seen.prepared():
+            return last
+        for metric in self._metrics:
+            if metric.name in self._can_wait:
+                self._take(metric, cloud, seen)
+        self._waiting = None
+        return replace(last, mu_m=self._mu_m(), warning_state=self._states())
 
     def twin_changed(self) -> None:
         """Forget surfaces and states of the twin before it learned; the rest values stay."""
@@ -145,21 +160,28 @@ class WarningMonitor:
             track.settle_until(-np.inf)
 
     def _measured(
-        self, metrics: Sequence[Metric], cloud: PointCloud, seen: SeenSurface, per_point_m: Floats
+        self, metrics: Sequence[Metric], cloud: PointCloud, seen: SeenSurface
     ) -> MonitorReading:
         """The reading after ``metrics`` compared a cloud; the other metrics say what they said."""
+        distances: Callable[[], Floats] = nowhere
         for metric in metrics:
-            measured = metric.measure(cloud.points_m, seen)
-            self._tracks[metric.name].take(measured.value_m, cloud.stamp_s)
+            measured = self._take(metric, cloud, seen)
             if metric.name == LocalMetric.name:
-                per_point_m = measured.per_point_m
-            if metric.name in self._can_wait:
-                self._caught_up_s = cloud.stamp_s
-        mu_m = {name: track.mu_m for name, track in self._tracks.items()}
-        return MonitorReading(cloud.stamp_s, mu_m, self._states(), per_point_m)
+                distances = measured.distances
+        return MonitorReading(cloud.stamp_s, self._mu_m(), self._states(), distances)
+
+    def _take(self, metric: Metric, cloud: PointCloud, seen: SeenSurface) -> Measurement:
+        measured = metric.measure(cloud.points_m, seen)
+        self._tracks[metric.name].take(measured.value_m, cloud.stamp_s)
+        if metric.name in self._can_wait:
+            self._caught_up_s = cloud.stamp_s
+        return measured
 
     def _unknown(self, time_s: float) -> MonitorReading:
         return MonitorReading(time_s, dict.fromkeys(self._tracks, float("nan")), self._states())
+
+    def _mu_m(self) -> dict[str, float]:
+        return {name: track.mu_m for name, track in self._tracks.items()}
 
     def _states(self) -> dict[str, int]:
         return {name: track.state for name, track in self._tracks.items()}

@@ -188,7 +188,7 @@ class SyntheticRun:
                 stamp_s=time_s,
                 mu_m={"local": mu_m, "median": median_m},
                 warning_state={"local": state, "median": int(median_m > 0.002)},
-                per_point_m=errors_m,
+                distances=lambda: errors_m,
             ),
             force_n=force_n if tick > 1 else float("nan"),
             true_force_n=0.92 * force_n + 0.002 * float(rng.random()) if self.with_truth else None,

@@ -9,9 +9,10 @@ the joints would have to be even where no arm can go, which is what a check of l
 
 from __future__ import annotations
 
-from math import asin, atan2, cos, hypot, pi, sin
+from math import asin, atan2, cos, pi, sin, sqrt
 
 import numpy as np
+from numba import njit
 
 from defras_sim.arm.dh import ROWS, WRIST_TO_TIP_M
 from defras_sim.geometry import Floats, Pose
@@ -21,6 +22,7 @@ _INSERTION_AT_RCM_M = -(ROWS[2].d + ROWS[3].d)
 """Insertion at which the wrist pitch axis would stand in the remote centre."""
 _SMALLEST_M = 1e-9
 _Vector = tuple[float, float, float]
+jit = njit(cache=True, nogil=True)
 
 
 class Undetermined(ValueError):
@@ -36,38 +38,42 @@ def joints_of(base_from_tip: Pose) -> Floats:
     Raises:
         Undetermined: the wrist's yaw axis points at the remote centre.
     """
-    # Plain numbers: on vectors of three, arrays are ten times slower.
-    turn, position_m = base_from_tip.rotation, base_from_tip.position_m
-    approach, yaw_axis = _vector(turn[:, 2].tolist()), _scaled(_vector(turn[:, 0].tolist()), -1.0)
-    yaw_origin_m = _sum(_vector(position_m.tolist()), approach, -WRIST_TO_TIP_M)
-    normal = _cross(yaw_origin_m, yaw_axis)
-    length_m = hypot(*normal)
-    if length_m < _SMALLEST_M:
+    joints, found = _joints(base_from_tip.rotation, base_from_tip.position_m)
+    if not found:
         raise Undetermined(
-            f"at {np.round(position_m, 4)} m from the remote centre the wrist's yaw "
+            f"at {np.round(base_from_tip.position_m, 4)} m from the remote centre the wrist's yaw "
             "axis points at it; turn the tip"
         )
+    return joints
+
+
+@jit
+def _joints(turn: Floats, position_m: Floats) -> tuple[Floats, bool]:
+    """Joints (6,), and whether the wrist's pitch axis is determined."""
+    approach = (turn[0, 2], turn[1, 2], turn[2, 2])
+    yaw_axis = (-turn[0, 0], -turn[1, 0], -turn[2, 0])
+    position = (position_m[0], position_m[1], position_m[2])
+    yaw_origin_m = _sum(position, approach, -WRIST_TO_TIP_M)
+    normal, joints = _cross(yaw_origin_m, yaw_axis), np.full(6, np.nan)
+    length_m = sqrt(_dot(normal, normal))
+    if length_m < _SMALLEST_M:
+        return joints, False
     pitch_axis = _scaled(normal, 1.0 / length_m)
     link = _cross(yaw_axis, pitch_axis)  # from the pitch axis to the yaw axis
     if _dot(link, _sum(yaw_origin_m, link, -_PITCH_TO_YAW_M)) < 0.0:
         pitch_axis, link = _scaled(pitch_axis, -1.0), _scaled(link, -1.0)
     pitch_origin_m = _sum(yaw_origin_m, link, -_PITCH_TO_YAW_M)
-    depth_m = hypot(*pitch_origin_m)
+    depth_m = sqrt(_dot(pitch_origin_m, pitch_origin_m))
     shaft = _scaled(pitch_origin_m, 1.0 / depth_m)
     yaw = atan2(shaft[0], -shaft[2])
     pitch = asin(min(1.0, max(-1.0, -shaft[1])))
     across = (-sin(yaw) * sin(pitch), -cos(pitch), cos(yaw) * sin(pitch))
     rolled = _cross(pitch_axis, shaft)
-    return np.array(
-        [
-            yaw,
-            pitch,
-            depth_m + _INSERTION_AT_RCM_M,
-            atan2(_dot(rolled, _cross(shaft, across)), _dot(rolled, across)),
-            atan2(_dot(link, rolled), _dot(link, shaft)),
-            atan2(-_dot(approach, pitch_axis), _dot(approach, link)),
-        ]
-    )
+    joints[0], joints[1], joints[2] = yaw, pitch, depth_m + _INSERTION_AT_RCM_M
+    joints[3] = atan2(_dot(rolled, _cross(shaft, across)), _dot(rolled, across))
+    joints[4] = atan2(_dot(link, rolled), _dot(link, shaft))
+    joints[5] = atan2(-_dot(approach, pitch_axis), _dot(approach, link))
+    return joints, True
 
 
 def turned_back(angle_rad: float) -> float:
@@ -75,23 +81,22 @@ def turned_back(angle_rad: float) -> float:
     return (angle_rad + pi) % (2 * pi) - pi
 
 
-def _vector(numbers: list[float]) -> _Vector:
-    x, y, z = numbers
-    return x, y, z
-
-
+@jit
 def _dot(a: _Vector, b: _Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+@jit
 def _scaled(a: _Vector, by: float) -> _Vector:
     return a[0] * by, a[1] * by, a[2] * by
 
 
+@jit
 def _sum(a: _Vector, b: _Vector, times: float) -> _Vector:
     """``a`` and ``b``, the latter so many times."""
     return a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2]
 
 
+@jit
 def _cross(a: _Vector, b: _Vector) -> _Vector:
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
