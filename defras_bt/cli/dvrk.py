@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from defras_bt.cli.dvrk_cameras import app as cameras
 from defras_bt.cli.dvrk_simulate import simulate
 
 app = typer.Typer(
@@ -11,3 +12,4 @@ app = typer.Typer(
     help="The da Vinci Research Kit: set-up, registration, check, and a stand-in for it.",
 )
 app.command("simulate")(simulate)
+app.add_typer(cameras, name="cameras")

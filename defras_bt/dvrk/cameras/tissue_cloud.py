@@ -30,18 +30,19 @@ class TissueFilter:
             Unusable: the cloud is not in metres, or empty.
         """
         require_metres(np.linalg.norm(cloud.points, axis=-1).ravel(), "cloud")
-        points_m = self.tissue_from_camera.apply(cloud.points[self.taken(cloud)])
+        points_m = self.tissue_from_camera.apply(cloud.points[taken_points(cloud, self.colours)])
         return decimate_m(points_m[self.workspace.holds(points_m)], self.voxel_m)
 
-    def taken(self, cloud: ColouredCloud) -> NDArray[np.bool_]:
-        """Which points (h, w) have the tissue's colour; all that were measured without colours.
 
-        In a cloud with the rows of a picture, points at edges are left out: they mix two depths.
-        """
-        depth_m = cloud.points[..., 2]
-        measured: NDArray[np.bool_] = np.isfinite(depth_m)
-        if cloud.rgb is None:
-            return measured
-        if cloud.is_picture:
-            return tissue_pixels(cloud.rgb, depth_m, self.colours)
-        return measured & self.colours.tissue.mask(cloud.rgb)
+def taken_points(cloud: ColouredCloud, colours: ColourCalibration) -> NDArray[np.bool_]:
+    """Which points (h, w) have the tissue's colour; all that were measured without colours.
+
+    In a cloud with the rows of a picture, points at edges are left out: they mix two depths.
+    """
+    depth_m = cloud.points[..., 2]
+    measured: NDArray[np.bool_] = np.isfinite(depth_m)
+    if cloud.rgb is None:
+        return measured
+    if cloud.is_picture:
+        return tissue_pixels(cloud.rgb, depth_m, colours)
+    return measured & colours.tissue.mask(cloud.rgb)
