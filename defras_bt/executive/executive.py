@@ -6,7 +6,6 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 from py_trees.visitors import VisitorBase
 
 from defras_bt.acting.actions import action_leaves
@@ -212,7 +211,7 @@ class Executive:
     def _tell_stopped(self, verdict: GateVerdict) -> None:
         """Say, once, that the gate stopped motion which the tree had wanted."""
         wanted = self._board.command.arms.values()
-        moving = any(np.any(arm.linear_m_s) or np.any(arm.angular_rad_s) for arm in wanted)
+        moving = any(arm.moves for arm in wanted)
         stopped = verdict.reasons if moving else ()
         if stopped and stopped != self._stopped_before:
             sentence = f"The command gate stopped motion: {'; '.join(stopped)}."

@@ -177,9 +177,7 @@ def _blindness(inputs: TickInputs) -> list[str]:
 
 def _ownerless(proposed: Proposal) -> list[str]:
     """Motion may only come from an action that goes on: not from one that a guard has ended."""
-    moving = any(
-        arm.linear_m_s.any() or arm.angular_rad_s.any() for arm in proposed.command.arms.values()
-    )
+    moving = any(arm.moves for arm in proposed.command.arms.values())
     if moving and not proposed.acting:
         return ["motion was proposed, but no action was under way when the tick ended"]
     return []

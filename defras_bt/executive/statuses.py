@@ -159,13 +159,17 @@ def deciding_child(parent: Behaviour, heard: Mapping[Behaviour, _Word]) -> Behav
     children of a selector failed, one that was not even tried decides nothing. Call it as soon as
     ``parent`` was ticked; ``heard`` has what was ticked in this tick.
     """
-    ticked = [child for child in parent.children if child in heard]
-    if len(ticked) < 2:
-        return ticked[0] if ticked else None
-    same = [child for child in ticked if heard[child].status == parent.status]
-    tried = [child for child in same if heard[child].code != Code.WOULD_NOT_HELP]
-    candidates = tried or same or ticked
-    return candidates[-1]
+    status, same, ticked = parent.status, None, None
+    for child in reversed(parent.children):
+        word = heard.get(child)
+        if word is None:
+            continue
+        if word.status == status:
+            if word.code != Code.WOULD_NOT_HELP:
+                return child
+            same = same or child
+        ticked = ticked or child
+    return same or ticked
 
 
 def carries_out_plans(slot: PlanSlot | None) -> Behaviour | None:

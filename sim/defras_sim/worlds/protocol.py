@@ -107,6 +107,11 @@ class ArmCommand:
         numbers = [*self.linear_m_s.tolist(), *self.angular_rad_s.tolist(), jaw_rad]
         return all(map(isfinite, numbers))
 
+    @property
+    def moves(self) -> bool:
+        """Whether the tip is to move or turn at all; what is not a number counts as motion."""
+        return any(self.linear_m_s.flat) or any(self.angular_rad_s.flat)
+
 
 @dataclass(frozen=True)
 class Command:
