@@ -30,6 +30,7 @@ from defras_sim.yaml_source import read_yaml
 
 Port = Annotated[int, Field(ge=1024, le=65535)]
 Seconds = Annotated[float, Field(gt=0, le=10)]
+Beside = Annotated[Path, Field(validate_default=True)]
 _PORTS: dict[ArmName, int] = {"psm1": 48051, "psm2": 48052}
 
 
@@ -87,7 +88,8 @@ class Stream(Part):
 
     ``step_m``, ``step_rad``: farthest between two set-points that follow each other.
     ``watchdog_s``: so long after a command motion stops by itself. ``realtime_priority``: of the
-    process that streams, 1 to 99 for the system's real-time scheduler, 0 for none.
+    process that streams, 1 to 99 for the system's real-time scheduler, 0 for none; without it the
+    usual one where the system grants it.
     """
 
     rate_hz: Annotated[float, Field(ge=100, le=1000)] = 100.0
@@ -100,7 +102,7 @@ class Stream(Part):
     step_m: Annotated[float, Field(gt=0, le=0.002)] = 0.001
     step_rad: Annotated[float, Field(gt=0, le=0.1)] = 0.03
     watchdog_s: Annotated[float, Field(ge=0.02, le=0.5)] = 0.1
-    realtime_priority: Annotated[int, Field(ge=0, le=99)] = 0
+    realtime_priority: Annotated[int, Field(ge=0, le=99)] | None = None
 
     @property
     def period_s(self) -> float:
@@ -157,8 +159,8 @@ class Setup(Part):
     stream: Stream = Stream()
     limits: Limits = Limits()
     rates: Rates = Rates()
-    registration: Path = Path("registration.yaml")
-    checked: Path = Path("dvrk_check.json")
+    registration: Beside = Path("registration.yaml")
+    checked: Beside = Path("dvrk_check.json")
 
     @field_validator("registration", "checked")
     @classmethod

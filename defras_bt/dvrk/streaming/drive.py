@@ -13,7 +13,12 @@ from defras_bt.dvrk.streaming.echo import Echo
 from defras_bt.dvrk.streaming.jaw_stream import JawStream
 from defras_bt.dvrk.streaming.supervisor import Standing, Supervisor
 from defras_bt.dvrk.streaming.tip_stream import TipStream, TipVelocity
-from defras_bt.dvrk.transport.messages import JointMessage, PoseMessage, WrenchMessage
+from defras_bt.dvrk.transport.messages import (
+    JointMessage,
+    PoseMessage,
+    StateMessage,
+    WrenchMessage,
+)
 from defras_sim.geometry import Pose
 
 _QUIET_M = 3e-4
@@ -43,6 +48,7 @@ class ArmSnapshot:
     jaw: JointMessage | None
     jaw_setpoint: JointMessage | None
     wrench: WrenchMessage | None
+    state: StateMessage | None
     goal: Pose | None
     stopped: str
 
@@ -131,6 +137,7 @@ class ArmDrive:
             arm.jaw.message,
             arm.jaw_setpoint.message,
             arm.wrench.message,
+            arm.operating_state.message,
             None if self._tip is None else self._tip.goal,
             told,
         )

@@ -44,12 +44,14 @@ class Snapshot:
 class StreamReport:
     """``period``: between set-points, while any were sent. ``latency_s``: by sensor, from its
     stamp to the first set-point decided on it; median and 99th percentile. ``took_up_s``: from
-    sending to the echo. ``broke``: what ended the stream, in words."""
+    sending to the echo. ``broke``: what ended the stream, in words. ``realtime``: whether the
+    system let the stream run before other programs."""
 
     period: PeriodReport
     latency_s: Mapping[str, tuple[float, float]]
     took_up_s: tuple[float, float] | None
     broke: str = ""
+    realtime: bool = False
 
 
 class Servo(Protocol):
@@ -60,6 +62,9 @@ class Servo(Protocol):
 
     def snapshot(self) -> Snapshot:
         """All arms as they were last heard."""
+
+    def clock_s(self) -> float:
+        """The time on the robot's clock."""
 
     def report(self) -> StreamReport:
         """How regular the stream was so far, and how long its ways took."""
@@ -105,6 +110,9 @@ class ServoLoop:
         with self._lock:
             arms = {name: drive.snapshot() for name, drive in self._drives.items()}
         return Snapshot(self._transport.now_s(), arms, self.broke)
+
+    def clock_s(self) -> float:
+        return self._transport.now_s()
 
     def report(self) -> StreamReport:
         took_up = self._log.took_up
