@@ -20,7 +20,7 @@ from defras_sim.yaml_source import InvalidFile
 COMMANDS = ("run", "plan", "view", "explain", "operator", "replay", "diagnose", "doctor")
 """Commands, each the function of its name in the module of its name."""
 
-GROUPS = ("scene", "tree", "benchmark", "dvrk")
+GROUPS = ("scene", "tree", "train", "benchmark", "dvrk")
 """Groups of commands, each the ``app`` of the module of its name."""
 
 
