@@ -10,6 +10,7 @@ from time import perf_counter, process_time
 
 import numpy as np
 
+from defras_bt.benchmark.tissue_bed import BED_MOTIONS, OverBed, over_bed
 from defras_bt.benchmark.tissue_models import (
     TOOL_SPEED_M_S,
     BulletSlab,
@@ -122,7 +123,7 @@ class Work:
     """A case to measure, by name, so that progress can tell of it."""
 
     title: str
-    run: Callable[[], Case | Growth]
+    run: Callable[[], Case | Growth | OverBed]
 
 
 def works(*, quick: bool) -> Iterator[Work]:
@@ -132,6 +133,9 @@ def works(*, quick: bool) -> Iterator[Work]:
         for material in MATERIALS:
             make = partial(OwnTissue, motion, material)
             yield _work(OWN, make, motion, material, STEP_M, motion.length_m)
+    for motion in motions if quick else BED_MOTIONS:
+        for material in MATERIALS:
+            yield Work(f"{motion.title} over a bed", partial(over_bed, motion, material))
     for motion in motions:
         felupe = partial(FelupeTissue, motion, "neo_hookean")
         bullet, mujoco = partial(BulletSlab, motion), partial(MujocoSlab, motion)
@@ -282,6 +286,7 @@ def notes(*, quick: bool) -> list[str]:
         "Reference: 27-node hexahedra, 24x24x2, in equilibrium by felupe. No bed, no gravity: "
         "every motion then has one smooth branch. Allowed: 5 % of the force or 0.005 N, whichever "
         "is larger, as the length of the difference of the vectors.",
+        "Over a bed: this model alone, since every model has a law of contact of its own.",
         "Static models go 1 mm a frame; dynamic ones move the tool at 15 mm/s. PyBullet runs its "
         "own neo-Hookean law, MuJoCo St. Venant-Kirchhoff (it warns of an ill-conditioned solve); "
         "felupe runs the same mesh with 27 points an element and without dents.",

@@ -49,11 +49,13 @@ def tissue(
             f"this benchmark compares with felupe, and {error.name} is not installed; "
             "install the extra: pip install 'defras[bench]'"
         ) from error
+    from defras_bt.benchmark.tissue_bed import OverBed, bed_row
     from defras_bt.benchmark.tissue_paths import PathResult, failures, run_paths, summary
     from defras_bt.benchmark.tissue_plot import tissue_figure
 
     cases: list[Case] = []
     sizes: list[Growth] = []
+    beds: list[OverBed] = []
     ends: list[PathResult] = []
     said = notes(quick=quick)
 
@@ -63,6 +65,7 @@ def tissue(
             "Targets": targets(cases, ends),
             "Random paths": [asdict(summary(ends))],
             "Random paths that failed somewhere": failures(ends),
+            "Over a bed": [run.row() for run in beds] + ([bed_row(beds)] if beds else []),
             "Growth with the mesh": [size.row() for size in sizes],
             "Every model and motion": [case.row() for case in cases],
         }
@@ -78,6 +81,8 @@ def tissue(
             found = work.run()
             if isinstance(found, Case):
                 cases.append(found)
+            elif isinstance(found, OverBed):
+                beds.append(found)
             else:
                 sizes.append(found)
             progress.console.print(str(found))
@@ -98,11 +103,11 @@ def tissue(
     Console().print(table)
     paths_said = summary(ends)
     typer.echo(
-        f"{paths_said.paths} random paths: {paths_said.converged:.2%} of {paths_said.steps} steps "
+        f"{paths_said.paths} random paths: {paths_said.converged:.3%} of {paths_said.steps} steps "
         f"converged, {paths_said.untrue} not finite, {paths_said.errors} errors"
     )
     typer.echo(f"Written to {out}: tissue.json, tissue.csv, tissue.html")
 
 
 def _said(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
