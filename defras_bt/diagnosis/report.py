@@ -37,29 +37,12 @@ from defras_bt.diagnosis.report_words import (
 )
 from defras_bt.diagnosis.verdict import Estimate, Verdict
 from defras_bt.diagnosis.verdict_file import Origin
+from defras_bt.recording.report_parts import Panel, Tile
 from defras_bt.recording.report_plots import png_uri
 from defras_sim.effects.effect import Effect
 from defras_sim.scene import Scene
 
 _LEAST_SHOWN_ALIKE = 2
-
-
-@dataclass(frozen=True)
-class Tile:
-    """One key number: ``value`` stands large, ``note`` under it; ``tone`` is good, bad or plain."""
-
-    name: str
-    value: str
-    note: str = ""
-    tone: str = "plain"
-
-
-@dataclass(frozen=True)
-class Panel:
-    """A picture with what it shows."""
-
-    caption: str
-    address: str
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import rerun.blueprint as rrb
 from rerun.blueprint import archetypes
 from rerun.blueprint.components import LinkAxis
 
+from defras_bt.recording.timeline_blueprint import PLOT_BACKGROUND, field_view
+
 APPLICATION = "defras_diagnosis"
 
-_BACKGROUND = (24, 27, 31)
-_PLOT_BACKGROUND = (13, 15, 18)
 _MOST_PLOTS = 6
 
 
@@ -50,9 +50,9 @@ def blueprint(plots: Sequence[Plot], *, replay: bool, extended: bool) -> rrb.Blu
 
 
 def _field(name: str, model: str) -> rrb.Spatial3DView:
-    return rrb.Spatial3DView(
-        origin="/world",
-        contents=[
+    return field_view(
+        name,
+        [
             "/world/bed",
             "/world/roi/**",
             "/world/attachments/**",
@@ -61,15 +61,6 @@ def _field(name: str, model: str) -> rrb.Spatial3DView:
             f"/world/tissue/{model}",
             f"/world/tissue/observed_{model}",
         ],
-        name=name,
-        background=_BACKGROUND,
-        line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=(-0.11, -0.17, 0.125),
-            look_target=(0.0, 0.0, 0.02),
-            eye_up=(0.0, 0.0, 1.0),
-        ),
     )
 
 
@@ -78,7 +69,7 @@ def _plot(plot: Plot) -> rrb.TimeSeriesView:
         origin=f"/residual/{plot.place}",
         contents=[f"/residual/{plot.place}/**"],
         name=plot.title,
-        background=archetypes.PlotBackground(color=_PLOT_BACKGROUND, show_grid=True),
+        background=archetypes.PlotBackground(color=PLOT_BACKGROUND, show_grid=True),
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop),
         axis_y=rrb.ScalarAxis(range=(plot.low, plot.high)),
         axis_x=rrb.TimeAxis(link=LinkAxis.LinkToGlobal),

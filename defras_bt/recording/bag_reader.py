@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -40,10 +40,13 @@ class Series:
 
 @dataclass(frozen=True)
 class Bag:
-    """Topics that could be read, and (topic, message type) of those that are of no known type."""
+    """Topics that could be read, and (topic, message type) of those that are of no known type.
+
+    ``unread`` are the topics that nobody asked for."""
 
     series: Mapping[str, Series]
     skipped: tuple[tuple[str, str], ...] = field(default=())
+    unread: tuple[str, ...] = ()
 
     def __getitem__(self, topic: str) -> Series:
         if topic not in self.series:
@@ -51,24 +54,28 @@ class Bag:
         return self.series[topic]
 
 
-def read_bag(path: Path) -> Bag:
+def read_bag(path: Path, topics: Collection[str] | None = None) -> Bag:
     """Read an MCAP file, a ROS 2 bag folder or a ROS 1 ``.bag`` file.
 
     An MCAP file that a killed process left without its end is read up to its last whole chunk.
+    With ``topics``, only those are read; a laboratory's bag may hold gigabytes of others.
     """
     if path.is_file() and is_cut_off(path):
         with TemporaryDirectory() as folder:
             whole = Path(folder) / path.name
             recover_mcap(path, whole)
-            return _read(whole)
-    return _read(path)
+            return _read(whole, topics)
+    return _read(path, topics)
 
 
-def _read(path: Path) -> Bag:
+def _read(path: Path, topics: Collection[str] | None) -> Bag:
     with AnyReader([path]) as reader:
         series: dict[str, Series] = {}
-        skipped = []
+        skipped, unread = [], []
         for topic, found in sorted(reader.topics.items()):
+            if topics is not None and topic not in topics:
+                unread.append(topic)
+                continue
             read = _READERS.get(found.msgtype or "")
             if read is None:
                 skipped.append((topic, found.msgtype or "several types"))
@@ -79,7 +86,7 @@ def _read(path: Path) -> Bag:
             ]
             if messages:
                 series[topic] = _series(found.msgtype or "", messages, read)
-    return Bag(series, tuple(skipped))
+    return Bag(series, tuple(skipped), tuple(unread))
 
 
 def _series(

@@ -9,9 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from defras_bt.recording.decisions import DECISIONS_FILE, SCHEMA
+from defras_bt.recording.bag_reader import read_bag
+from defras_bt.recording.decisions import DECISIONS_FILE, DECISIONS_TOPIC, SCHEMA
 from defras_bt.recording.moment import Moment, NodeWord
 from defras_bt.recording.record import Cause, Event
+
+_BAGS = (".bag", ".mcap")
 
 
 class InvalidDecisions(ValueError):
@@ -73,18 +76,15 @@ class Decisions:
 
 
 def read_decisions(run: Path) -> Decisions:
-    """Read a run's folder, or its decisions.jsonl. A last line that was cut off is left out.
+    """Read a run's folder, its decisions.jsonl, or a bag that others recorded of the run.
+
+    A last line that was cut off is left out.
 
     Raises:
         InvalidDecisions: it is not there, or not what this program writes.
     """
     path = run / DECISIONS_FILE if run.is_dir() else run
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidDecisions(
-            f"{path} cannot be read ({error}); give a folder that defras run --out left"
-        ) from error
+    text = _of_bag(path) if path.suffix in _BAGS else _of_file(path)
     # What follows the last line's end was being written when the process died.
     lines = [_object(path, n, line) for n, line in enumerate(text.split("\n")[:-1], 1)]
     if not lines or lines[0].get("schema") != SCHEMA:
@@ -95,6 +95,22 @@ def read_decisions(run: Path) -> Decisions:
         return Decisions(path, lines[0]["tree"], kinds, lines[1:])
     except (KeyError, TypeError, ValueError) as error:
         raise InvalidDecisions(f"{path}:1: should name tree and nodes ({error!r})") from error
+
+
+def _of_file(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidDecisions(
+            f"{path} cannot be read ({error}); give a folder that defras run --out left"
+        ) from error
+
+
+def _of_bag(path: Path) -> str:
+    series = read_bag(path, (DECISIONS_TOPIC,)).series
+    if DECISIONS_TOPIC not in series:
+        raise InvalidDecisions(f"{path} has no {DECISIONS_TOPIC}: nobody published decisions in it")
+    return "".join(line + "\n" for line in series[DECISIONS_TOPIC].texts)
 
 
 def _object(path: Path, number: int, line: str) -> dict[str, Any]:

@@ -17,23 +17,23 @@ from defras_bt.recording.record import Cause, RunInfo, RunSummary, TickRecord
 
 SCHEMA = "defras/decisions/1"
 DECISIONS_FILE = "decisions.jsonl"
+DECISIONS_TOPIC = "/executive/decisions"
+"""Strings of the same lines, where a run is recorded by others (``rosbag record``)."""
 
 
-class DecisionRecorder:
-    """Writes ``path`` line by line: a killed process loses at most the line it was writing."""
+class DecisionLines:
+    """The lines of a run, one after the other."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._file: TextIO | None = None
+    def __init__(self) -> None:
         self._before: dict[str, NodeWord] = {}
 
-    def start(self, info: RunInfo) -> None:
-        self._file = self._path.open("w", encoding="utf-8", buffering=1)
-        self._write(
-            {"schema": SCHEMA, "tree": info.tree, "nodes": [list(node) for node in info.tree_paths]}
-        )
+    def first(self, info: RunInfo) -> str:
+        """The line before the first tick."""
+        nodes = [list(node) for node in info.tree_paths]
+        return _line({"schema": SCHEMA, "tree": info.tree, "nodes": nodes})
 
-    def tick(self, record: TickRecord) -> None:
+    def tick(self, record: TickRecord) -> str:
+        """The line of the next tick."""
         now = node_words(record)
         line: dict[str, Any] = {
             "tick": record.tick,
@@ -50,17 +50,33 @@ class DecisionRecorder:
         if record.events:
             line["events"] = [[e.kind, e.level, e.sentence] for e in record.events]
         self._before = now
-        self._write(line)
+        return _line(line)
+
+
+class DecisionRecorder:
+    """Writes ``path`` line by line: a killed process loses at most the line it was writing."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file: TextIO | None = None
+        self._lines = DecisionLines()
+
+    def start(self, info: RunInfo) -> None:
+        self._file = self._path.open("w", encoding="utf-8", buffering=1)
+        self._file.write(self._lines.first(info) + "\n")
+
+    def tick(self, record: TickRecord) -> None:
+        if self._file is None:
+            raise RuntimeError("a tick came before the start of the run: call start first")
+        self._file.write(self._lines.tick(record) + "\n")
 
     def finish(self, summary: RunSummary) -> None:
         if self._file is not None:
             self._file.close()
 
-    def _write(self, line: Mapping[str, Any]) -> None:
-        if self._file is None:
-            raise RuntimeError("a tick came before the start of the run: call start first")
-        text = json.dumps(line, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-        self._file.write(text + "\n")
+
+def _line(content: Mapping[str, Any]) -> str:
+    return json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
 
 
 def _cause(cause: Cause | None) -> list[str] | None:

@@ -25,6 +25,7 @@ from defras_sim.worlds.protocol import ArmObservation, Observation, PointCloud
 
 SETUP_TOPIC = "/executive/setup"
 INPUTS_TOPIC = "/executive/inputs"
+CLOUD_TOPIC = "/tissue/points"
 
 _OPERATOR: TypeAdapter[OperatorState] = TypeAdapter(OperatorState)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from defras_bt.recording.bag_reader import read_bag
-from defras_bt.recording.inputs import INPUTS_TOPIC, SETUP_TOPIC, TickInput, read_input
+from defras_bt.recording.inputs import CLOUD_TOPIC, INPUTS_TOPIC, SETUP_TOPIC, TickInput, read_input
 
 BAG = "recording.mcap"
 
@@ -36,14 +36,14 @@ def read_inputs(run: Path) -> RecordedInputs:
     file = run / BAG if run.is_dir() else run
     if not file.is_file():
         raise NoInputs(f"{file} does not exist; give a folder that defras run --out left")
-    series = read_bag(file).series
+    series = read_bag(file, (SETUP_TOPIC, INPUTS_TOPIC, CLOUD_TOPIC)).series
     missing = [topic for topic in (SETUP_TOPIC, INPUTS_TOPIC) if topic not in series]
     if missing:
         raise NoInputs(
             f"{file} has no {' and no '.join(missing)}: it is of another program or an older "
             "version, or ended before its first second"
         )
-    clouds = series["/tissue/points"].points_m if "/tissue/points" in series else ()
+    clouds = series[CLOUD_TOPIC].points_m if CLOUD_TOPIC in series else ()
     return RecordedInputs(
         file,
         json.loads(series[SETUP_TOPIC].texts[0]),

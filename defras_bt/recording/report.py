@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from defras_bt.recording import palette
 from defras_bt.recording.explain import Explanation, explain
 from defras_bt.recording.moment import moment_of
 from defras_bt.recording.record import RunInfo, RunSummary, TickRecord
+from defras_bt.recording.report_parts import Panel, Tile
 from defras_bt.recording.report_plots import (
     attachments_svg,
     depth_picture,
@@ -27,24 +27,6 @@ from defras_bt.recording.scene_picture import endoscope_view, field_view, pictur
 from defras_bt.recording.story import newton, outcome_title, percent, result_sentence, times
 from defras_bt.recording.tree_layout import tree_order
 from defras_bt.recording.whole_file import write_whole
-
-
-@dataclass(frozen=True)
-class Tile:
-    """One key number: ``value`` stands large, ``note`` under it; ``tone`` is good, bad or plain."""
-
-    name: str
-    value: str
-    note: str = ""
-    tone: str = "plain"
-
-
-@dataclass(frozen=True)
-class Panel:
-    """A picture with what it shows."""
-
-    caption: str
-    address: str
 
 
 class ReportRecorder:

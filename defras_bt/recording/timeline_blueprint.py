@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import rerun.blueprint as rrb
 from rerun.blueprint import archetypes
 from rerun.blueprint.components import LinkAxis
@@ -10,20 +12,17 @@ from rerun.blueprint.encodings import TextLogColumn, TextLogColumnKind, Timeline
 APPLICATION = "defras"
 
 # The viewer's own theme is dark; views of another brightness would glare.
-_BACKGROUND = (24, 27, 31)
-_PLOT_BACKGROUND = (13, 15, 18)
+BACKGROUND = (24, 27, 31)
+PLOT_BACKGROUND = (13, 15, 18)
 
 
-def default_blueprint(*, truth_known: bool, pictures: bool) -> rrb.Blueprint:
-    """Scene, endoscope and plan on the left; lanes, signals and log on the right.
-
-    ``truth_known``: the recording holds the actual tissue. ``pictures``: it holds the endoscope's
-    picture; without one, the scene is drawn as the endoscope would see it.
-    """
-    scene = rrb.Spatial3DView(
+def field_view(name: str, contents: Sequence[str] = ("$origin/**",)) -> rrb.Spatial3DView:
+    """The operating field from obliquely above, with what stands at ``contents`` of the tree."""
+    return rrb.Spatial3DView(
         origin="/world",
-        name="Operating field",
-        background=_BACKGROUND,
+        contents=list(contents),
+        name=name,
+        background=BACKGROUND,
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
@@ -32,6 +31,15 @@ def default_blueprint(*, truth_known: bool, pictures: bool) -> rrb.Blueprint:
             eye_up=(0.0, 0.0, 1.0),
         ),
     )
+
+
+def default_blueprint(*, truth_known: bool, pictures: bool) -> rrb.Blueprint:
+    """Scene, endoscope and plan on the left; lanes, signals and log on the right.
+
+    ``truth_known``: the recording holds the actual tissue. ``pictures``: it holds the endoscope's
+    picture; without one, the scene is drawn as the endoscope would see it.
+    """
+    scene = field_view("Operating field")
     drawn = [
         "/world/bed",
         "/world/roi/**",
@@ -43,19 +51,19 @@ def default_blueprint(*, truth_known: bool, pictures: bool) -> rrb.Blueprint:
         origin="/world/endoscope",
         contents=["/world/endoscope/**", *([] if pictures else drawn)],
         name="Endoscope" if pictures else "Endoscope (drawn)",
-        background=_BACKGROUND,
+        background=BACKGROUND,
     )
     attachments = rrb.Spatial2DView(
         origin="/map",
         name="Attachments, from above",
-        background=_BACKGROUND,
+        background=BACKGROUND,
         visual_bounds=rrb.VisualBounds2D(x_range=(-70, 70), y_range=(-70, 70)),
     )
     plan = rrb.TextDocumentView(origin="/plan", contents=["/plan"], name="Plan")
     tree = rrb.GraphView(
         origin="/tree",
         name="Behaviour tree",
-        background=archetypes.GraphBackground(color=_BACKGROUND),
+        background=archetypes.GraphBackground(color=BACKGROUND),
         # The nodes stand where the recording puts them.
         force_link=archetypes.ForceLink(enabled=False),
         force_many_body=archetypes.ForceManyBody(enabled=False),
@@ -107,7 +115,7 @@ def _plot(name: str, *signals: str) -> rrb.TimeSeriesView:
         origin="/signals",
         contents=[f"/signals/{signal}/**" for signal in signals],
         name=name,
-        background=archetypes.PlotBackground(color=_PLOT_BACKGROUND, show_grid=True),
+        background=archetypes.PlotBackground(color=PLOT_BACKGROUND, show_grid=True),
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop),
         axis_x=rrb.TimeAxis(link=LinkAxis.LinkToGlobal),
     )
