@@ -48,21 +48,37 @@ def known_noise(
 
 
 def maxima(
-    board: Board, noise: KnownNoise, residual: Floats, count: int, rng: np.random.Generator
+    board: Board,
+    noise: KnownNoise,
+    residual: Floats,
+    count: int,
+    rng: np.random.Generator,
+    off: Floats | None = None,
 ) -> Floats:
-    """The best candidate's statistic on each of ``count`` surrogates of ``residual`` (n,)."""
-    return score(board, surrogate_products(board, noise, residual, count, rng)).largest()
+    """The best candidate's statistic on each of ``count`` surrogates of ``residual`` (n,); ``off``
+    (n, count): what the twin itself may be off by in each."""
+    return score(board, surrogate_products(board, noise, residual, count, rng, off)).largest()
 
 
 def surrogate_products(
-    board: Board, noise: KnownNoise, residual: Floats, count: int, rng: np.random.Generator
+    board: Board,
+    noise: KnownNoise,
+    residual: Floats,
+    count: int,
+    rng: np.random.Generator,
+    off: Floats | None = None,
 ) -> Products:
     """Inner products of whitened columns and ``count`` surrogates."""
     white = noise.middle.whiten(board.columns)
     parts: list[Products] = []
+    begun = 0
     shares = np.diff(np.linspace(0, count, len(noise.variants) + 1).astype(int))
     for variant, share in zip(noise.variants, shares, strict=True):
         for drawn in surrogates(variant, residual, int(share), rng):
+            here = slice(begun, begun + drawn.shape[1])
+            begun = here.stop
+            if off is not None:
+                drawn = drawn + np.where(variant.seen[:, None], off[:, here], 0.0)
             gram = parts[0].gram if parts else None
             parts.append(products(white, noise.middle.whiten(drawn), board.fold, gram))
     return Products(

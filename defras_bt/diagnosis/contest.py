@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from defras_bt.diagnosis.columns import Option
 from defras_bt.diagnosis.diagnosis import Round, Trial
 from defras_bt.diagnosis.excess import is_practical
-from defras_bt.diagnosis.fitted import Fit, bare, conflicts
-from defras_bt.diagnosis.fitting import Addition, extend, walked, without
-from defras_bt.diagnosis.held_out import Products, losses
+from defras_bt.diagnosis.fitted import Fit, bare, conflicts, model_without
+from defras_bt.diagnosis.fitting import Addition, differentiate, extend, refine, walked, without
+from defras_bt.diagnosis.held_out import Loss, Products, losses
 from defras_bt.diagnosis.noise import Noise, estimate_noise
 from defras_bt.diagnosis.noise_search import Beside
+from defras_bt.diagnosis.problem import Integers
 from defras_bt.diagnosis.ranking import Board, bounds_of, score, start_of
 from defras_bt.diagnosis.search import Search
 
 _CLEARLY = 2.0
 """Of the threshold, for causes that are accepted together."""
+_WIDTH = 0.25
+"""Of a parameter's step, to both sides, over which a derivative is measured."""
 
 
 def accepted_together(
@@ -28,20 +34,15 @@ def accepted_together(
     chance waits for a round of its own.
     """
     limit *= _CLEARLY
-    index = np.concatenate([now.null(""), *(own for _, own in beside.columns_of(now))])
-    bounds = tuple(b for option, own in beside.columns_of(now) for b in bounds_of(option, own))
-    left = losses(found, index, bounds).amplitudes[len(now.null("")) :, 0]
-    additions: list[Addition] = []
-    for (key, _), (option, own) in zip(beside.removed, beside.columns_of(now), strict=True):
-        candidate = search.sketch.candidate(key)
-        if not any(conflicts(candidate, one.candidate) for one in additions):
-            additions.append(Addition(candidate, option, left[: len(own)]))
-        left = left[len(own) :]
+    additions = _promising_together(search, now, found, beside, limit)
+    if len(additions) < 2:
+        return False
     fit = extend(
         search.counted, search.fit, additions, search.noise, iterations=search.settings.iterations
     )
     while fit is not None:
         after = noise_after(search, {"": fit}, search.noise)
+        search.counted.foresee([model_without(fit, one.candidate.key) for one in additions])
         trials = [_needed(search, fit, one.candidate.key, after) for one in additions]
         weakest = min(trials, key=lambda t: t.held_out if t.practical else -np.inf)
         if weakest.held_out > limit and weakest.practical:
@@ -59,6 +60,56 @@ def accepted_together(
     search.removed = ()
     search.history.append(fit)
     return True
+
+
+_Chosen = tuple[str, Option, Integers]
+"""A cause by key, one of its options, and its columns on the board."""
+
+
+def _promising_together(
+    search: Search, now: Board, found: Products, beside: Beside, limit: float
+) -> list[Addition]:
+    """Of the causes that the noise was estimated beside, those that the linearised model needs,
+    beside the others: without each of them held-out loss is larger by more than ``limit``, and what
+    it changes is of practical size."""
+    chosen: list[_Chosen] = []
+    for (key, _), (option, own) in zip(beside.removed, beside.columns_of(now), strict=True):
+        candidate = search.sketch.candidate(key)
+        if not any(conflicts(candidate, search.sketch.candidate(other)) for other, *_ in chosen):
+            chosen.append((key, option, own))
+    while len(chosen) > 1:
+        index, whole = _fitted(now, found, chosen)
+        gains = []
+        for one in chosen:
+            less = [other for other in chosen if other is not one]
+            gain = float(_fitted(now, found, less)[1].total[0] / whole.total[0]) - 1.0
+            gains.append(gain if _is_large(search, now, one, index, whole) else -np.inf)
+        if min(gains) > limit:
+            break
+        del chosen[int(np.argmin(gains))]
+    index, whole = _fitted(now, found, chosen)
+    amplitudes = whole.amplitudes[:, 0]
+    return [
+        Addition(search.sketch.candidate(key), option, amplitudes[np.searchsorted(index, own)])
+        for key, option, own in chosen
+    ]
+
+
+def _fitted(now: Board, found: Products, chosen: Sequence[_Chosen]) -> tuple[Integers, Loss]:
+    """Causes fitted together on the linearised model, with the columns that this takes."""
+    index = np.unique(np.concatenate([now.null(""), *(own for *_, own in chosen)]))
+    bounds = tuple(b for _, option, own in chosen for b in bounds_of(option, own))
+    return index, losses(found, index, bounds)
+
+
+def _is_large(search: Search, now: Board, one: _Chosen, index: Integers, whole: Loss) -> bool:
+    """Whether what a cause changes on the linearised model is worth naming."""
+    amplitudes = whole.amplitudes[:, 0]
+    own = one[2]
+    change = now.columns[:, own] @ amplitudes[np.searchsorted(index, own)]
+    left = search.fit.residual - now.columns[:, index] @ amplitudes
+    share = search.settings.relative_gain
+    return is_practical(change, left + change, left, search.samples, share)
 
 
 def _needed(search: Search, fit: Fit, key: str, noise: Noise) -> Trial:
@@ -96,10 +147,20 @@ def accepted_of(
     search.fits[accepted.key] = fits
     search.fit = fits[accepted.key]
     if len(now.of_option[accepted.key]) > 1:
-        search.fit = walked(search.counted, search.fit, accepted.key, after)
+        search.fit = _settled(search, accepted.key, after)
     search.history.append(search.fit)
     search.noise = after
     return True
+
+
+def _settled(search: Search, key: str, noise: Noise) -> Fit:
+    """The present fit, led on where the start of a cause's fit was one of several: with derivatives
+    of where it is, if the problem knows them, and to and fro along what has none."""
+    fit, counted = search.fit, search.counted
+    if counted.derivatives(fit.model, fit.candidates):
+        fresh = differentiate(counted, fit, np.full(len(fit.free), _WIDTH))
+        fit = refine(counted, fresh, noise, iterations=search.settings.iterations)
+    return walked(counted, fit, key, noise)
 
 
 def noise_after(search: Search, fits: dict[str, Fit], noise: Noise) -> Noise:

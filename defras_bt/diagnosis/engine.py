@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -20,25 +19,14 @@ from defras_bt.diagnosis.further import measure_further
 from defras_bt.diagnosis.intervals import estimates, standard_errors
 from defras_bt.diagnosis.outside import left_over
 from defras_bt.diagnosis.plain_squares import fit_plainly
-from defras_bt.diagnosis.problem import Candidate, Problem, Remarking
+from defras_bt.diagnosis.problem import Approximating, Problem, Remarking
 from defras_bt.diagnosis.search import Progress
 from defras_bt.diagnosis.selection import select
 from defras_bt.diagnosis.sets import rivals
 from defras_bt.diagnosis.settings import Settings
 from defras_bt.diagnosis.verdict_building import diagnosis_of
-from defras_sim.effects.effect import EffectParameter, Extension, Values
+from defras_sim.effects.effect import EffectParameter, Values
 from defras_sim.geometry import Floats
-
-
-@runtime_checkable
-class KnowsItsOwnErrors(Protocol):
-    """A problem whose twin knows how far its own approximations move a fit."""
-
-    def systematic(self, model: Extension, candidate: Candidate) -> Values:
-        """Standard error by parameter, in its unit, that more data would not lessen (the fit
-        repeated on another mesh)."""
-        ...
-
 
 _NARROWEST, _WIDEST = 0.02, 2.0
 """Steps over which derivatives are taken."""
@@ -178,6 +166,11 @@ def _arrived(found: Findings) -> None:
     problem = search.counted.problem
     for candidate in search.fit.candidates:
         systematic: Values = {}
-        if isinstance(problem, KnowsItsOwnErrors):
-            systematic = problem.systematic(search.fit.model, candidate)
+        if isinstance(problem, Approximating):
+            columns = {
+                p.name: column / p.step
+                for (key, p), column in zip(fresh.free, fresh.jacobian.T, strict=True)
+                if key == candidate.key
+            }
+            systematic = problem.systematic(search.fit.residual, candidate, columns, search.rng)
         found.estimates[candidate.key] = estimates(search.fit, candidate, known, systematic)

@@ -65,9 +65,15 @@ def excess_by_sensor(before: Floats, after: Floats, samples: Samples) -> tuple[E
 
 
 def is_practical(
-    change: Floats, without: Floats, with_it: Floats, samples: Samples, share: float
+    change: Floats,
+    without: Floats,
+    with_it: Floats,
+    samples: Samples,
+    share: float,
+    floors: float = 1.0,
 ) -> bool:
-    """Whether a cause that changes predictions by ``change`` (n,) is worth naming.
+    """Whether a cause that changes predictions by ``change`` (n,) is worth naming; ``floors``: by
+    how many times the practical floors a change has to be larger.
 
     Some sensor has to say so, each by itself: how many millimetres a newton is worth nobody knows,
     and one sensor's large error is no reason to overlook what another sees. See
@@ -76,7 +82,7 @@ def is_practical(
     tolerance = tolerances(samples)[samples.channel]
     seen = np.isfinite(change) & np.isfinite(without) & np.isfinite(with_it)
     return any(
-        _matters_to(sensor, seen, change, without, with_it, samples, tolerance, share)
+        _matters_to(sensor, seen, change, without, with_it, samples, tolerance, share, floors)
         for sensor in dict.fromkeys(channel.sensor for channel in samples.channels)
     )
 
@@ -90,6 +96,7 @@ def _matters_to(
     samples: Samples,
     tolerance: Floats,
     share: float,
+    floors: float,
 ) -> bool:
     """The change is, root mean square, more than the practical floor of one of the sensor's
     channels; its square is at least ``share`` of the sensor's excess; and held-out residuals,
@@ -99,7 +106,8 @@ def _matters_to(
     large = False
     for index in own:
         values = change[(samples.channel == index) & seen]
-        if len(values) and float(np.sqrt(np.mean(values**2))) > samples.channels[index].floor:
+        floor = floors * samples.channels[index].floor
+        if len(values) and float(np.sqrt(np.mean(values**2))) > floor:
             large = True
     if not large:
         return False

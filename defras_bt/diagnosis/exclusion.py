@@ -26,8 +26,9 @@ def exclusions(search: Search) -> tuple[dict[str, Excluded], tuple[str, ...]]:
     known = known_noise(now, beside, search.samples, search.layout, search.rng)
     filled = np.nan_to_num(search.fit.residual)[:, None]
     found = whitened_products(now, known.middle, filled)
+    count = search.settings.surrogates
     chance = surrogate_products(
-        now, known, beside.remainder, search.settings.surrogates, search.rng
+        now, known, beside.remainder, count, search.rng, search.approximations(count)
     )
     invisible = unseen(now, found)
     result: dict[str, Excluded] = {}

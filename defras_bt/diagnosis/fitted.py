@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from defras_bt.diagnosis.problem import Candidate, Problem
+from defras_bt.diagnosis.problem import Candidate, Differentiating, Foreseeing, Problem
 from defras_sim.effects.effect import EffectParameter, Extension
 from defras_sim.geometry import Floats
 
@@ -24,6 +24,7 @@ class CountedProblem:
         self.problem = problem
         self.calls = 0
         self._known: dict[str, Floats] = {}
+        self._derivatives: tuple[str, Mapping[tuple[str, str], Floats]] | None = None
         self.plain = self._predict(plain)
         if not np.isfinite(self.plain).any():
             raise ValueError("the plain model cannot be compared with any of the data")
@@ -36,12 +37,34 @@ class CountedProblem:
         kept = np.where(np.isfinite(found), found, self.plain)
         return np.where(np.isfinite(self.plain), kept, np.nan)
 
+    def foresee(self, models: Sequence[Extension]) -> None:
+        """Residuals of ``models`` will be asked for next: the twin may work on several at once."""
+        new = {_name(model): model for model in models if _name(model) not in self._known}
+        if isinstance(self.problem, Foreseeing) and len(new) > 1:
+            self.problem.foresee(tuple(new.values()))
+
+    def derivatives(
+        self, model: Extension, candidates: Sequence[Candidate]
+    ) -> Mapping[tuple[str, str], Floats]:
+        """As :meth:`Differentiating.derivatives`; none where the problem knows none."""
+        problem = self.problem
+        if not isinstance(problem, Differentiating):
+            return {}
+        name = repr((_name(model), [c.key for c in candidates]))
+        if self._derivatives is None or self._derivatives[0] != name:
+            self._derivatives = name, problem.derivatives(model, candidates)
+        return self._derivatives[1]
+
     def _predict(self, model: Extension) -> Floats:
-        name = repr(sorted((effect, sorted(values.items())) for effect, values in model.items()))
+        name = _name(model)
         if name not in self._known:
             self._known[name] = np.asarray(self.problem.residual(model), dtype=float)
             self.calls += 1
         return self._known[name]
+
+
+def _name(model: Extension) -> str:
+    return repr(sorted((effect, sorted(values.items())) for effect, values in model.items()))
 
 
 @dataclass(frozen=True)

@@ -118,40 +118,56 @@ def refine(counted: CountedProblem, fit: Fit, noise: Noise, *, iterations: int) 
 
 
 def differentiate(counted: CountedProblem, fit: Fit, widths: Floats) -> Fit:
-    """``fit`` with its derivatives measured anew where it arrived, as differences over ``widths``
-    (k,) steps to both sides: over about what the parameters are uncertain by, a twin that is rough
-    on a smaller scale is judged by what matters."""
+    """``fit`` with its derivatives known anew where it arrived.
+
+    Those that the problem does not know itself are differences over ``widths`` (k,) steps to both
+    sides: over about what the parameters are uncertain by, a twin that is rough on a smaller scale
+    is judged by what matters.
+    """
     before = counted.calls
-    columns = []
-    for (key, p), width in zip(fit.free, widths, strict=True):
+    known = counted.derivatives(fit.model, fit.candidates)
+    measured: dict[int, tuple[Extension, Extension, float]] = {}
+    for index, ((key, p), width) in enumerate(zip(fit.free, widths, strict=True)):
+        if (key, p.name) in known:
+            continue
         candidate = next(c for c in fit.candidates if c.key == key)
         value = _value(fit.model, fit.candidates, key, p)
         ends = np.clip((value - width * p.step, value + width * p.step), p.lower, p.upper)
-        below, above = (
-            counted.residual(added(fit.model, candidate, {p.name: float(end)})) for end in ends
-        )
-        span = (ends[1] - ends[0]) / p.step
-        columns.append(np.nan_to_num(below - above) / max(float(span), 1e-12))
+        below, above = (added(fit.model, candidate, {p.name: float(end)}) for end in ends)
+        measured[index] = below, above, max(float(ends[1] - ends[0]) / p.step, 1e-12)
+    counted.foresee([model for pair in measured.values() for model in pair[:2]])
+    columns = []
+    for index, (key, p) in enumerate(fit.free):
+        if index in measured:
+            below, above, span = measured[index]
+            change = counted.residual(below) - counted.residual(above)
+            columns.append(np.nan_to_num(change) / span)
+        else:
+            columns.append(np.nan_to_num(known[key, p.name]) * p.step)
     calls = fit.calls + counted.calls - before
     return replace(fit, jacobian=np.stack(columns, axis=1), calls=calls)
 
 
 def walked(counted: CountedProblem, fit: Fit, key: str, noise: Noise) -> Fit:
     """``fit`` after trying both neighbours of each of a candidate's parameters, near and nearer:
-    for causes whose derivatives lead astray, as play and slip."""
+    for causes whose derivatives lead astray, as play and slip. Those of which the problem itself
+    knows derivatives are left as they are."""
     before = counted.calls
     candidate = next(c for c in fit.candidates if c.key == key)
     model, residual = fit.model, fit.residual
     loss = _loss(noise, residual)
+    known = counted.derivatives(model, fit.candidates)
     for p in candidate.free:
+        if (key, p.name) in known:
+            continue
         stride = p.step
         while stride > _FINEST * p.step:
             value = _value(model, fit.candidates, key, p)
             better = False
-            for there in (value - stride, value + stride):
-                if not p.lower <= there <= p.upper:
-                    continue
-                trial = added(model, candidate, {p.name: there})
+            ways = [v for v in (value - stride, value + stride) if p.lower <= v <= p.upper]
+            trials = [added(model, candidate, {p.name: there}) for there in ways]
+            counted.foresee(trials)
+            for trial in trials:
                 found = counted.residual(trial)
                 if np.isfinite(found).any() and _loss(noise, found) < loss:
                     model, residual, loss = trial, found, _loss(noise, found)
@@ -195,18 +211,24 @@ def _from_tangent(option: Option, free: Sequence[EffectParameter]) -> list[Float
 
 def _jacobian(counted: CountedProblem, fit: Fit, known: Sequence[Floats | None]) -> Floats:
     """Change of predictions per step (n, k); ``known`` columns are taken as they are."""
-    columns = []
-    for (key, p), column in zip(fit.free, known, strict=True):
+    beside: dict[int, tuple[Extension, float]] = {}
+    for index, ((key, p), column) in enumerate(zip(fit.free, known, strict=True)):
         if column is not None:
-            columns.append(column)
             continue
         value = _value(fit.model, fit.candidates, key, p)
         change = _DIFFERENCE * p.step
         if not p.lower <= value + change <= p.upper:
             change = -change
-        effect = next(c for c in fit.candidates if c.key == key)
-        beside = counted.residual(added(fit.model, effect, {p.name: value + change}))
-        columns.append(np.nan_to_num(fit.residual - beside) * (p.step / change))
+        candidate = next(c for c in fit.candidates if c.key == key)
+        beside[index] = added(fit.model, candidate, {p.name: value + change}), change
+    counted.foresee([model for model, _ in beside.values()])
+    columns = []
+    for index, ((_, p), column) in enumerate(zip(fit.free, known, strict=True)):
+        if column is not None:
+            columns.append(column)
+            continue
+        model, change = beside[index]
+        columns.append(np.nan_to_num(fit.residual - counted.residual(model)) * (p.step / change))
     return np.stack(columns, axis=1) if columns else np.zeros((len(fit.residual), 0))
 
 

@@ -39,6 +39,8 @@ def fit_plainly(search: Search) -> None:
     orders = np.zeros(len(search.samples.channels), np.int64)
     fit = search.fit
     white = estimate_noise(fit.residual, search.samples, search.layout, orders.tolist())
+    if not _promised(search, white):
+        return
     for _ in range(_ROUNDS):
         fit = refine(search.counted, fit, white, iterations=search.settings.iterations)
         white = estimate_noise(fit.residual, search.samples, search.layout, orders.tolist())
@@ -52,6 +54,13 @@ def fit_plainly(search: Search) -> None:
         search.history.append(fit)
         _drop_idle(search, white)
         _take_in_nuisances(search, white)
+
+
+def _promised(search: Search, white: Noise) -> bool:
+    """Whether by the linearised model plain squares would predict held-out data better at all."""
+    now = excess(search.held_out(search.fit, search.noise).residual, search.samples)
+    plain = replace(search, fitted_with=white).held_out(search.fit, search.noise)
+    return excess(plain.residual, search.samples) < now
 
 
 def _with_fresh_derivatives(search: Search, fit: Fit, white: Noise) -> Fit:

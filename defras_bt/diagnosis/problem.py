@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from defras_sim.effects.effect import Effect, EffectParameter, Extension
+from defras_sim.effects.effect import Effect, EffectParameter, Extension, Values
 from defras_sim.geometry import Floats
 
 Integers = NDArray[np.int64]
@@ -117,6 +117,50 @@ class Problem(Protocol):
         """How predictions change if ``candidate`` is added to (or, where ``model`` has it, moved
         in) ``model``: one where the null point has a derivative, several secants where it has
         none."""
+        ...
+
+
+@runtime_checkable
+class Foreseeing(Protocol):
+    """A problem whose twin takes long, and that works on several models side by side."""
+
+    def foresee(self, models: Sequence[Extension]) -> None:
+        """Residuals of ``models`` will be asked for next."""
+        ...
+
+
+@runtime_checkable
+class Differentiating(Protocol):
+    """A problem that knows derivatives where a model stands, for less than predictions cost."""
+
+    def derivatives(
+        self, model: Extension, candidates: Sequence[Candidate]
+    ) -> Mapping[tuple[str, str], Floats]:
+        """Change (n,) of the predictions per unit, by candidate key and free parameter, of
+        ``candidates`` that ``model`` has; those that have to be measured are left out."""
+        ...
+
+
+@runtime_checkable
+class Approximating(Protocol):
+    """A problem whose twin is known to be off by itself, before any data: a mesh, a contact law."""
+
+    def approximations(self, count: int, rng: np.random.Generator) -> Floats:
+        """Draws (n, count) of such errors, in the units of the data. What they would give to the
+        luckiest candidate counts as chance."""
+        ...
+
+    def systematic(
+        self,
+        residual: Floats,
+        candidate: Candidate,
+        columns: Mapping[str, Floats],
+        rng: np.random.Generator,
+    ) -> Values:
+        """Standard error by parameter, in its unit, that more data would not lessen.
+
+        ``residual`` (n,) is that of the fit; ``columns`` (n,) by parameter are the change of the
+        predictions per unit."""
         ...
 
 

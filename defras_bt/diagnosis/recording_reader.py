@@ -39,7 +39,7 @@ def read_recording(path: Path, scene: Scene, topics: TopicMap | None = None) -> 
             f"arms {', '.join(scene.arms)}"
         )
     try:
-        bag = read_bag(path)
+        bag = read_bag(path, chosen.topics)
     except (AnyReaderError, OSError, ValueError) as error:
         raise UnusableRecording(
             f"{path} cannot be read as a recording: {error}; valid are MCAP files, ROS 2 bag "

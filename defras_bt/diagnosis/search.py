@@ -15,7 +15,7 @@ from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise import Noise
 from defras_bt.diagnosis.noise_search import Chosen
 from defras_bt.diagnosis.predicted_folds import HeldOut, hold_out
-from defras_bt.diagnosis.problem import Samples
+from defras_bt.diagnosis.problem import Approximating, Samples
 from defras_bt.diagnosis.ranking import Board, board
 from defras_bt.diagnosis.settings import Settings
 from defras_sim.geometry import Floats
@@ -70,6 +70,13 @@ class Search:
         columns = np.concatenate((fit.jacobian, self.nuisance_columns(*without)), axis=1)
         folds = self.samples.fold
         return hold_out(fit.residual, columns, noise, folds, len(fit.free), self.fitted_with)
+
+    def approximations(self, count: int) -> Floats | None:
+        """Draws (n, count) of what the twin itself may be off by, where it is known."""
+        problem = self.counted.problem
+        if not isinstance(problem, Approximating):
+            return None
+        return problem.approximations(count, self.rng)
 
     def take_out(self, key: str) -> None:
         """Remove an accepted cause, and fit the others anew."""

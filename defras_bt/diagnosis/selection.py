@@ -101,7 +101,8 @@ def _threshold(
     where the best candidate is anywhere near it."""
     if search.rounds and largest > _FAR_ABOVE * search.rounds[-1].threshold:
         return search.rounds[-1].threshold
-    chance = maxima(now, known, left, search.settings.surrogates, search.rng)
+    count = search.settings.surrogates
+    chance = maxima(now, known, left, count, search.rng, search.approximations(count))
     return max(float(np.quantile(chance, 1.0 - search.settings.false_alarm)), 0.0)
 
 

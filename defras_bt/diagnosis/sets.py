@@ -20,6 +20,8 @@ from defras_sim.geometry import Floats
 
 _ALIKE = 0.8
 _MOST = 3
+_BEHIND = 0.3
+"""Of the named cause's statistic: rivals below it on the linearised model are not fitted."""
 
 
 def rivals(search: Search, key: str, confounding: Confounding, told: Progress) -> tuple[str, ...]:
@@ -48,15 +50,26 @@ def _rival_fits(
         if last and name in fits:
             found[name] = fits[name]
             continue
-        told(f"whether {name} explains the same as {key}", 0.5)
         if less is None:
             less = without(
                 search.counted, search.fit, key, search.noise, iterations=search.settings.iterations
             )
+        if _far_behind(search, less, name, key):
+            continue
+        told(f"whether {name} explains the same as {key}", 0.5)
         fit = _begun_from_ranking(search, less, name, key)
         if fit is not None:
             found[name] = fit
     return found
+
+
+def _far_behind(search: Search, less: Fit, name: str, key: str) -> bool:
+    """Whether, beside the other causes, ``name`` explains so much less than ``key`` on the
+    linearised model that no full fit would bring it near."""
+    now = board(search.sketch, less.jacobian, search.samples.fold, [name, key])
+    found = whitened_products(now, search.noise, np.nan_to_num(less.residual)[:, None])
+    scores = score(now, found)
+    return float(scores.statistic(name)[0]) < _BEHIND * float(scores.statistic(key)[0])
 
 
 def _begun_from_ranking(search: Search, less: Fit, name: str, key: str) -> Fit | None:

@@ -10,6 +10,8 @@ from defras_bt.diagnosis.held_out import Products
 from defras_bt.diagnosis.ranking import Board, alike, remainder, score, start_of
 from defras_bt.diagnosis.search import Search
 
+_NEARLY = 0.7
+"""Of the practical floors."""
 _HOPELESS = 0.5
 """Of the threshold: candidates below it on the linearised model are not fitted."""
 _NOT_MUCH_WORSE = 0.3
@@ -22,14 +24,15 @@ _IN_A_CONTEST, _CONTESTS = 3, 4
 def worth_naming(
     search: Search, now: Board, found: Products, rows: tuple[Ranked, ...]
 ) -> tuple[Ranked, ...]:
-    """Candidates whose change would be worth naming by the linearised model; all, where none is.
+    """Candidates whose change would be worth naming by the linearised model; where none is, those
+    whose change is not far from it, as the linearised model may see too little of a cause.
 
     What is clearly seen but of no practical size must not stand in the way of what is both.
     """
     scores = score(now, found)
     residual = search.fit.residual
     without_it = remainder(now, found, residual, None)
-    worth = []
+    worth, nearly = [], []
     for row in rows:
         if not row.visible:
             continue
@@ -41,7 +44,9 @@ def worth_naming(
         share = search.settings.relative_gain
         if is_practical(change, without_it, with_it, search.samples, share):
             worth.append(row)
-    return tuple(worth) or rows
+        elif is_practical(change, without_it, with_it, search.samples, share, _NEARLY):
+            nearly.append(row)
+    return tuple(worth or nearly)
 
 
 def hopeful(search: Search, rows: tuple[Ranked, ...], limit: float) -> list[Ranked]:

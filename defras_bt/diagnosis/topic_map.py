@@ -40,9 +40,11 @@ class _Source(Part):
 
 
 class LengthSource(_Source):
-    """Poses, points."""
+    """Poses, points. ``tip_beyond_m``: how far the jaw's tip lies beyond the point that poses are
+    given of, along their z axis; a dVRK gives the origin of the wrist's yaw axis."""
 
     unit: Literal["m", "mm"] = "m"
+    tip_beyond_m: Annotated[float, Field(ge=-0.1, le=0.1)] = 0.0
 
     @property
     def scale(self) -> float:
@@ -140,6 +142,15 @@ class TopicMap(Part):
     frames: dict[str, FramePlace] = Field(default_factory=dict)
     jaw: JawAngles = JawAngles()
     stamps: Literal["header", "received"] = "header"
+
+    @property
+    def topics(self) -> frozenset[str]:
+        """Every topic that the map names."""
+        sources: list[_Source | None] = [self.cloud, self.visibility]
+        for arm in self.arms.values():
+            sources += [arm.setpoint, arm.measured, arm.joints, arm.setpoint_joints]
+            sources += [arm.jaw, arm.grasped, arm.force]
+        return frozenset(source.topic for source in sources if source is not None)
 
 
 def read_topic_map(file: Path) -> TopicMap:

@@ -81,7 +81,8 @@ class TopicReader:
 
     def missing(self, what: str, source: Source) -> UnusableRecording:
         """The error for something without which nothing can be compared."""
-        there = ", ".join(sorted(self._bag.series)) or "nothing that can be read"
+        held = sorted({*self._bag.series, *self._bag.unread})
+        there = ", ".join(held) or "nothing that can be read"
         return UnusableRecording(
             f"{self._file}: {what} should be on {source.topic}, which is not in the recording. It "
             f"holds: {there}. A topic map (--topics) says where things stand"
@@ -103,6 +104,7 @@ class TopicReader:
         rotation = np.zeros((0, 3, 3))
         if kept.any():
             rotation = placed.rotation @ Rotation.from_quat(turned[kept]).as_matrix()
+            position = position + source.tip_beyond_m * rotation[:, :, 2]
         self.require_near(source, position)
         return PoseReadings(self._kept_times(sieve, source, series), position, rotation)
 

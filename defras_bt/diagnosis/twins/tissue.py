@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -13,25 +13,36 @@ from defras_bt.diagnosis.problem import Candidate, Integers, Samples, Tangent
 from defras_bt.diagnosis.quality import DataQuality
 from defras_bt.diagnosis.recording import RecordedRun
 from defras_bt.diagnosis.recording_reader import UnusableRecording
+from defras_bt.diagnosis.twins.tissue_approximation import approximation_errors
 from defras_bt.diagnosis.twins.tissue_cells import AssignedCloud
 from defras_bt.diagnosis.twins.tissue_correction import MeshCorrection, finer
-from defras_bt.diagnosis.twins.tissue_frames import TissueFrames, frames_of
+from defras_bt.diagnosis.twins.tissue_first_jobs import first_jobs, key_shapes
+from defras_bt.diagnosis.twins.tissue_frames import (
+    TissueFrames,
+    before_the_camera,
+    frames_of,
+    led_along,
+)
+from defras_bt.diagnosis.twins.tissue_noise import noise_sd
 from defras_bt.diagnosis.twins.tissue_part import TissuePart
+from defras_bt.diagnosis.twins.tissue_passes import led
 from defras_bt.diagnosis.twins.tissue_phases import PHASES
-from defras_bt.diagnosis.twins.tissue_signals import Layout, gone_m, noise_sd
+from defras_bt.diagnosis.twins.tissue_signals import Layout, gone_m
 from defras_bt.diagnosis.twins.tissue_systematic import systematic_errors
 from defras_bt.diagnosis.twins.tissue_tangents import TissueTangents
 from defras_bt.diagnosis.twins.tissue_trajectory import MOST_FRAMES, Trajectory, trajectory
 from defras_sim.effects.effect import Extension, Values
 from defras_sim.geometry import Floats
+from defras_sim.prediction import Prediction
 from defras_sim.scene import Scene
-from defras_sim.tissue.model import NothingToGrasp
 
 BLOCKS = 8
 """Stretches of time of a recording that are held out one at a time."""
 WHOLE_FROM = 5
 """From so many recordings on, each is held out as a whole."""
 _REMEMBERED = 40
+"""Residuals, and models led along, that are kept: cameras and clocks are tried on known tissue."""
+_MOST_LED = 12
 
 
 class TissueProblem:
@@ -57,7 +68,7 @@ class TissueProblem:
         self.quality = DataQuality.together(_named_apart(runs))
         self.trajectories = tuple(trajectory(run, scene, most_frames) for run in runs)
         self.layout = Layout.of(scene, self.trajectories)
-        self._frames: OrderedDict[str, tuple[TissueFrames, ...]] = OrderedDict()
+        self._led: OrderedDict[str, tuple[Prediction, ...] | None] = OrderedDict()
         self._jobs = jobs
         plain, self._corrections = self._followed()
         self.assigned = tuple(
@@ -66,7 +77,6 @@ class TissueProblem:
         )
         self._tangents: tuple[str, TissueTangents] | None = None
         self._residuals: OrderedDict[str, Floats] = OrderedDict()
-        self._remember_frames("[]", tuple(plain))
         self.samples = self._samples(plain)
 
     def residual(self, model: Extension) -> Floats:
@@ -83,45 +93,121 @@ class TissueProblem:
                 self._residuals.popitem(last=False)
         return self._residuals[key]
 
+    def foresee(self, models: Sequence[Extension]) -> None:
+        """Lead several models along at once, on as many processes as there are, before their
+        residuals are asked for one by one."""
+        wanted = {}
+        for model in models:
+            key = _key(before_the_camera(self._whole(model)))
+            if _key(model) not in self._residuals and key not in self._led:
+                wanted[key] = model
+        if self._jobs > 1 and len(wanted) * len(self.trajectories) > 1:
+            self._lead_along(wanted)
+
     def tangents(self, model: Extension, candidate: Candidate) -> Sequence[Tangent]:
         """How predictions change with ``candidate``; what those of all share is found once."""
         key = _key(model)
         if self._tangents is None or self._tangents[0] != key:
-            frames = self.frames(model)
-            if frames is None:
+            parts = self._parts(model)
+            if parts is None:
                 return ()
-            whole = {**self.scene.model.extension, **model}
-            parts = [
-                TissuePart(self.scene, whole, self.layout, each, assigned, its)
-                for each, assigned, its in zip(
-                    self.trajectories, self.assigned, frames, strict=True
-                )
-            ]
             found = TissueTangents(
-                self.scene, whole, parts, self.candidates, tolerances(self.samples), self._jobs
+                self.scene,
+                self._whole(model),
+                parts,
+                self.candidates,
+                tolerances(self.samples),
+                self._jobs,
+                () if model else self._first_shapes,
             )
             self._tangents = (key, found)
         return self._tangents[1].of(candidate)
 
-    def systematic(self, model: Extension, candidate: Candidate) -> Values:
+    def derivatives(
+        self, model: Extension, candidates: Sequence[Candidate]
+    ) -> Mapping[tuple[str, str], Floats]:
+        """Change (n,) of predictions per unit of the free parameters of ``candidates`` that
+        ``model`` has, but for those that have to be measured."""
+        found: dict[tuple[str, str], Floats] = {}
+        parts = self._parts(model)
+        if parts is not None:
+            near = TissueTangents(
+                self.scene,
+                self._whole(model),
+                parts,
+                candidates,
+                tolerances(self.samples),
+                self._jobs,
+            )
+            for candidate in candidates:
+                for name, column in near.derivatives(candidate).items():
+                    found[candidate.key, name] = column
+        return found
+
+    def systematic(
+        self,
+        residual: Floats,
+        candidate: Candidate,
+        columns: Mapping[str, Floats],
+        rng: np.random.Generator,
+    ) -> Values:
         """Standard error by parameter that the twin's own approximations make."""
-        return systematic_errors(
-            self.samples, self.residual(model), candidate, self.tangents(model, candidate)
-        )
+        return systematic_errors(self.samples, residual, candidate, columns, rng)
+
+    def approximations(self, count: int, rng: np.random.Generator) -> Floats:
+        """Draws (n, count) of what the twin itself may be off by."""
+        return approximation_errors(self.samples, count, rng)
 
     def frames(self, model: Extension) -> tuple[TissueFrames, ...] | None:
         """What ``model`` says of the frames of every trajectory; None where it cannot."""
-        key = _key(model)
-        if key not in self._frames:
-            try:
-                found = tuple(
-                    correction.applied(frames_of(self.scene, model, each))
-                    for each, correction in zip(self.trajectories, self._corrections, strict=True)
-                )
-            except (NothingToGrasp, ValueError):  # no such tissue, or none where the jaw closes
-                return None
-            self._remember_frames(key, found)
-        return self._frames[key]
+        whole = self._whole(model)
+        key = _key(before_the_camera(whole))
+        if key not in self._led:
+            self._lead_along({key: model})
+        self._led.move_to_end(key)
+        predictions = self._led[key]
+        if predictions is None:
+            return None
+        return tuple(
+            correction.applied(frames_of(prediction, self.scene, whole, each))
+            for each, correction, prediction in zip(
+                self.trajectories, self._corrections, predictions, strict=True
+            )
+        )
+
+    def _whole(self, model: Extension) -> dict[str, Values]:
+        """``model`` with the effects that the scene itself adopts, or in their place."""
+        return {**self.scene.model.extension, **model}
+
+    def _lead_along(self, models: Mapping[str, Extension]) -> None:
+        """Predict tissue and arms of ``models`` by key, side by side, and remember them."""
+        work = [
+            (self._whole(model), each) for model in models.values() for each in self.trajectories
+        ]
+        jobs = self._jobs if len(work) > 1 else 1
+        found = Parallel(n_jobs=jobs, inner_max_num_threads=1)(
+            delayed(led_along)(self.scene, whole, each) for whole, each in work
+        )
+        count = len(self.trajectories)
+        for number, key in enumerate(models):
+            self._remember(key, found[count * number : count * (number + 1)])
+
+    def _remember(self, key: str, predictions: Sequence[Prediction | None]) -> None:
+        followed = tuple(p for p in predictions if p is not None)
+        self._led[key] = followed if len(followed) == len(predictions) else None
+        while len(self._led) > _MOST_LED:
+            self._led.popitem(last=False)
+
+    def _parts(self, model: Extension) -> list[TissuePart] | None:
+        """Every trajectory beside ``model``; None where it cannot be followed."""
+        frames = self.frames(model)
+        if frames is None:
+            return None
+        whole = self._whole(model)
+        return [
+            TissuePart(self.scene, whole, self.layout, each, assigned, its)
+            for each, assigned, its in zip(self.trajectories, self.assigned, frames, strict=True)
+        ]
 
     def _blocks(self, frames: Sequence[TissueFrames]) -> list[Floats]:
         """Residuals (rows, frames) of every trajectory."""
@@ -130,37 +216,46 @@ class TissueProblem:
             for each, assigned, its in zip(self.trajectories, self.assigned, frames, strict=True)
         ]
 
-    def _remember_frames(self, key: str, frames: tuple[TissueFrames, ...]) -> None:
-        self._frames[key] = frames
-        while len(self._frames) > 3:
-            self._frames.popitem(last=False)
-
     def _followed(self) -> tuple[list[TissueFrames], tuple[MeshCorrection, ...]]:
         """The frames of every trajectory as the plain model has them, its mesh's error put right.
 
         Raises:
             UnusableRecording: the model cannot follow a trajectory at all.
         """
-        fine = finer(self.scene)
-        work = [(self.scene, each) for each in self.trajectories]
-        work += [] if fine is None else [(fine, each) for each in self.trajectories]
-        try:
-            found = Parallel(n_jobs=self._jobs, inner_max_num_threads=1)(
-                delayed(frames_of)(scene, {}, each) for scene, each in work
-            )
-        except NothingToGrasp as miss:
-            raise UnusableRecording(
-                f"the model cannot repeat a grasp that was recorded: {miss}. Is the scene that of "
-                "this recording, and are its frames right?"
-            ) from miss
-        plain = found[: len(self.trajectories)]
-        for each, frames in zip(self.trajectories, plain, strict=True):
-            if all(surface is None for surface in frames.surfaces):
+        whole, fine = self._whole({}), finer(self.scene)
+        effects = {c.effect.name: c.effect for c in self.candidates}
+        # The finer mesh takes longest: it begins first. What ranking needs comes along.
+        scenes = [self.scene] if fine is None else [fine, self.scene]
+        jobs = [
+            job
+            for each in self.trajectories
+            for job in first_jobs(self.scene, whole, each, tuple(effects.values()))
+        ]
+        found = Parallel(n_jobs=self._jobs, inner_max_num_threads=1)(
+            [
+                *(delayed(led_along)(s, whole, each) for s in scenes for each in self.trajectories),
+                *(delayed(led)(job, effects) for job in jobs),
+            ]
+        )
+        count = len(self.trajectories)
+        predicted = found[: count * len(scenes)]
+        plain, others = predicted[-count:], predicted[:count]
+        self._first_shapes = key_shapes(found[count * len(scenes) :], count)
+        self._remember(_key(before_the_camera(whole)), plain)
+        frames, corrections = [], []
+        for each, one, other in zip(self.trajectories, plain, others, strict=True):
+            if one is None:
+                raise UnusableRecording(
+                    f"{each.name}: the model cannot repeat a grasp that was recorded; it has no "
+                    "tissue there. Is the scene that of this recording, and are its frames right?"
+                )
+            coarse = frames_of(one, self.scene, whole, each)
+            if all(surface is None for surface in coarse.surfaces):
                 raise UnusableRecording(f"{each.name}: the model finds no equilibrium in any frame")
-        others = found[len(plain) :] or plain
-        corrections = tuple(map(MeshCorrection.between, plain, others))
-        corrected = [c.applied(f) for c, f in zip(corrections, plain, strict=True)]
-        return corrected, corrections
+            finest = coarse if other is None else frames_of(other, self.scene, whole, each)
+            corrections.append(MeshCorrection.between(coarse, finest))
+            frames.append(corrections[-1].applied(coarse))
+        return frames, tuple(corrections)
 
     def _samples(self, plain: Sequence[TissueFrames]) -> Samples:
         blocks = self._blocks(plain)

@@ -15,7 +15,9 @@ STRONG = {"extra_attachment": 300.0, "missing_attachment": 1.0, "inclusion": 4.0
 """Effects of a place whose beginning says little of how they end: a soft spring under tissue that
 is lifted far pulls ever more, a firm one holds it. The strength at which they are tried in full, at
 the places that explain the residual best."""
-PLACES_TRIED = 3
+PLACES_TRIED = 2
+PROMISING = 0.02
+"""Share of the residual's squares that a place has to explain to be tried in full."""
 
 
 def inwards(p: EffectParameter, value: float) -> float:

@@ -7,13 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defras_bt.diagnosis.problem import Integers
 from defras_bt.diagnosis.twins.tissue_trajectory import Trajectory
-from defras_sim.effects.effect import Extension
+from defras_sim.effects import library
+from defras_sim.effects.camera_layer import CameraLayer
+from defras_sim.effects.effect import Extension, Values
+from defras_sim.effects.layers import Layers
+from defras_sim.effects.tissue_effect import NoSuchTissue
 from defras_sim.geometry import Floats, Pose
-from defras_sim.prediction import predict
+from defras_sim.prediction import Prediction, predict
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
+from defras_sim.tissue.model import NothingToGrasp
+
+_LOOKING = ("camera", "clock")
+"""Layers that change how tissue is seen, and not where it is."""
 
 
 @dataclass(frozen=True)
@@ -31,28 +38,42 @@ class TissueFrames:
     corrected: Callable[[Floats], Floats]
 
 
-def frames_of(
-    scene: Scene, model: Extension, trajectory: Trajectory, chosen: Integers | None = None
-) -> TissueFrames:
-    """The frames of ``trajectory``, or those ``chosen`` of them, as ``scene`` says that they are
-    with the effects of ``model`` besides its own, or in their place.
+def before_the_camera(model: Extension) -> dict[str, Values]:
+    """The effects of ``model`` that change what tissue and arms do, less those at null."""
+    found = {}
+    for name, values in model.items():
+        effect = library.effect(name)
+        if effect.layer not in _LOOKING and not effect.is_null(values):
+            found[name] = values
+    return found
 
-    The tissue is solved at these only, and where a grip begins or ends.
 
-    Raises:
-        NothingToGrasp: a jaw takes tissue where the model has none.
-        ValueError: no tissue can be as ``model`` says.
+def led_along(scene: Scene, model: Extension, trajectory: Trajectory) -> Prediction | None:
+    """What tissue and arms do along ``trajectory`` as ``scene`` says, with all effects of ``model``
+    and none of the scene's; None where no tissue can be like that, or a jaw would take none.
+
+    The tissue is solved at :attr:`Trajectory.solved`. Camera and clock are left out.
     """
-    every = np.arange(len(trajectory.frames)) if chosen is None else chosen
-    rows = trajectory.frames[every]
-    found = predict(scene.extended({**scene.model.extension, **model}), trajectory.motion, rows)
-    at = np.searchsorted(found.rows, rows)
-    shown = [found.surface_shown(float(t)) for t in trajectory.motion.time_s[rows]]
+    try:
+        plain = scene.extended(before_the_camera(model))
+        return predict(plain, trajectory.motion, trajectory.solved)
+    except (NothingToGrasp, NoSuchTissue):
+        return None
+
+
+def frames_of(
+    prediction: Prediction, scene: Scene, model: Extension, trajectory: Trajectory
+) -> TissueFrames:
+    """The frames of ``trajectory`` as the camera of ``scene`` shows what was predicted, with the
+    effects of ``model`` on camera and clock."""
+    layers = Layers.of(model)
+    at = np.searchsorted(prediction.rows, trajectory.frames)
+    shown = [prediction.surface_shown(float(t) - layers.delay_s) for t in trajectory.time_s]
     return TissueFrames(
         tuple(s if np.isfinite(s.vertices_m).all() else None for s in shown),
-        {arm: found.force_n(arm)[at] for arm in trajectory.motion.arms},
-        {arm: _positions(poses)[at] for arm, poses in found.measured.items()},
-        found.camera.corrected,
+        {arm: prediction.force_n(arm)[at] for arm in trajectory.motion.arms},
+        {arm: _positions(poses)[at] for arm, poses in prediction.measured.items()},
+        CameraLayer(scene.depth_camera, layers.camera).corrected,
     )
 
 

@@ -33,11 +33,12 @@ ASIDE_M = 0.002
 @dataclass(frozen=True)
 class KeyShapes:
     """Solved keyframes of the model: as it is, and with every jaw taking (and keeping) the tissue
-    :data:`ASIDE_M` farther along x, and along y. None where it could not follow."""
+    :data:`ASIDE_M` farther along x, and along y. None where it could not follow; empty where nobody
+    asks for it."""
 
-    plain: Sequence[KeyShape | None]
-    aside_x: Sequence[KeyShape | None]
-    aside_y: Sequence[KeyShape | None]
+    plain: Sequence[KeyShape | None] = ()
+    aside_x: Sequence[KeyShape | None] = ()
+    aside_y: Sequence[KeyShape | None] = ()
 
 
 class TissuePart:

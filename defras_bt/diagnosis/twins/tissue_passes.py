@@ -8,6 +8,7 @@ from joblib import Parallel, delayed
 
 from defras_bt.diagnosis.twins.tissue_pass import KeyShape, PassJob, run_pass
 from defras_sim.effects.effect import Effect
+from defras_sim.effects.tissue_effect import NoSuchTissue
 from defras_sim.tissue.model import NothingToGrasp
 
 
@@ -19,13 +20,13 @@ def run_passes(
     A keyframe that a model cannot follow is None; so are all where it cannot take the tissue.
     """
     if jobs == 1 or len(work) <= 1:
-        return [_led(job, effects) for job in work]
-    led = Parallel(n_jobs=jobs, inner_max_num_threads=1)(delayed(_led)(j, effects) for j in work)
-    return list(led)
+        return [led(job, effects) for job in work]
+    found = Parallel(n_jobs=jobs, inner_max_num_threads=1)(delayed(led)(j, effects) for j in work)
+    return list(found)
 
 
-def _led(job: PassJob, effects: Mapping[str, Effect]) -> Sequence[KeyShape | None]:
+def led(job: PassJob, effects: Mapping[str, Effect]) -> Sequence[KeyShape | None]:
     try:
         return run_pass(job, effects)
-    except (NothingToGrasp, ValueError):
+    except (NothingToGrasp, NoSuchTissue):
         return [None] * len(job.chosen)

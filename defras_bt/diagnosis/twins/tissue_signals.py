@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defras_bt.diagnosis.problem import Channel, Integers
+from defras_bt.diagnosis.problem import Channel
 from defras_bt.diagnosis.twins.tissue_cells import AssignedCloud, CellGrid
 from defras_bt.diagnosis.twins.tissue_frames import TissueFrames
-from defras_bt.diagnosis.twins.tissue_phases import PHASES
 from defras_bt.diagnosis.twins.tissue_trajectory import Trajectory
 from defras_sim.geometry import Floats
 from defras_sim.scene import Camera, Scene
@@ -23,7 +22,6 @@ FORCE_FLOOR_N = 0.005
 FORCE_FLOOR_SHARE = 0.05
 """Of the largest force measured: the twin's force is as good as that."""
 TIP_FLOOR_M = 0.0001
-_FEW_FRAMES = 8
 _AXES = "xyz"
 
 
@@ -131,48 +129,3 @@ def gone_m(frames: TissueFrames, grid: CellGrid) -> Floats:
         way = np.linalg.norm(surface.vertices_m - first.vertices_m, axis=1)
         most = np.maximum(most, np.bincount(cell, way, minlength=len(grid)) / count)
     return most
-
-
-def noise_sd(
-    residual: Sequence[Floats], phases: Sequence[Integers], rows_alike: Integers
-) -> Floats:
-    """What each row (rows,) scatters by itself.
-
-    From the frames before anything was grasped, where only the sensor changes; where those are few,
-    from how much neighbouring frames differ. ``rows_alike`` (rows,) numbers rows of one kind of
-    sensor: a row that was never seen gets the median of its kind.
-    """
-    rest_index = PHASES.index("rest")
-    spread = []
-    for each, phase in zip(residual, phases, strict=True):
-        rest = each[:, phase == rest_index]
-        steps = np.diff(each, axis=1) / np.sqrt(2.0)
-        spread.append(
-            np.where(
-                np.isfinite(rest).sum(axis=1) >= _FEW_FRAMES,
-                _spread(rest - _middle(rest)),
-                _spread(steps),
-            )
-        )
-    found = _middle(np.stack(spread, axis=1))[:, 0]
-    for kind in np.unique(rows_alike):
-        mine = rows_alike == kind
-        known = found[mine & np.isfinite(found) & (found > 0)]
-        typical = float(np.median(known)) if len(known) else 0.0
-        found[mine] = np.where(np.isfinite(found[mine]), found[mine], typical)
-        # A row that happened to be still for a few frames is no better than its kind.
-        found[mine] = np.maximum(found[mine], 0.3 * typical)
-    return found
-
-
-def _middle(values: Floats) -> Floats:
-    """Median (rows, 1) of the finite values of each row, NaN where there are none."""
-    found = np.full((len(values), 1), np.nan)
-    some = np.isfinite(values).any(axis=1)
-    found[some, 0] = np.nanmedian(values[some], axis=1)
-    return found
-
-
-def _spread(values: Floats) -> Floats:
-    """Robust standard deviation (rows,) about zero, from the median of magnitudes."""
-    return 1.4826 * _middle(np.abs(values))[:, 0]

@@ -9,7 +9,7 @@ them. What cannot be differentiated is led along once with the effect and once w
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,11 +19,13 @@ from defras_bt.diagnosis.twins.tissue_beginnings import (
     ONSET,
     ONSETS,
     PLACES_TRIED,
+    PROMISING,
     SLACK,
     STRONG,
     inwards,
 )
-from defras_bt.diagnosis.twins.tissue_part import ASIDE_M, KeyShapes, TissuePart, with_values
+from defras_bt.diagnosis.twins.tissue_first_jobs import first_jobs, key_shapes
+from defras_bt.diagnosis.twins.tissue_part import KeyShapes, TissuePart, with_values
 from defras_bt.diagnosis.twins.tissue_pass import KeyShape, PassJob
 from defras_bt.diagnosis.twins.tissue_passes import run_passes
 from defras_sim.effects.effect import Extension
@@ -52,14 +54,15 @@ class TissueTangents:
         candidates: Sequence[Candidate],
         tolerance: Floats,
         jobs: int,
+        shapes: Sequence[KeyShapes] = (),
     ) -> None:
-        """``tolerance`` (rows,): what is small in each row. ``jobs`` processes work at once."""
+        """``tolerance`` (rows,): what is small in each row. ``jobs`` processes work at once.
+        ``shapes`` of every trajectory, where the model was led along already."""
         self._scene, self._model, self._parts = scene, model, tuple(parts)
         self._tolerance = tolerance
         self._effects = {c.effect.name: c.effect for c in candidates}
-        self._shapes: list[KeyShapes] = []
         self._repeats: dict[str, list[_Repeat]] = {}
-        self._lead_along(jobs)
+        self._shapes = list(shapes) or self._led_along(jobs)
         self._try_in_full(candidates, jobs)
 
     def of(self, candidate: Candidate) -> tuple[Tangent, ...]:
@@ -170,16 +173,16 @@ class TissueTangents:
             ]
             yield Tangent(repeat.at, (repeat.step,), np.concatenate(blocks)[:, None])
 
-    def _lead_along(self, jobs: int) -> None:
-        """Lead the model along every trajectory: with derivatives, and with grips aside."""
-        tissue = tuple(n for n, e in self._effects.items() if isinstance(e, TissueEffect))
-        work: list[PassJob] = []
-        for part in self._parts:
-            plain = self._job(part, self._model)
-            work.append(replace(plain, watched=tissue, derivatives=True))
-            work += [replace(plain, aside_m=way) for way in ((ASIDE_M, 0.0), (0.0, ASIDE_M))]
-        found = run_passes(work, self._effects, jobs)
-        self._shapes = [KeyShapes(*found[3 * i : 3 * i + 3]) for i in range(len(self._parts))]
+    def _led_along(self, jobs: int) -> list[KeyShapes]:
+        """The model led along every trajectory: with derivatives, and with grips aside."""
+        work = [
+            job
+            for part in self._parts
+            for job in first_jobs(
+                self._scene, self._model, part.trajectory, tuple(self._effects.values())
+            )
+        ]
+        return key_shapes(run_passes(work, self._effects, jobs), len(self._parts))
 
     def _try_in_full(self, candidates: Sequence[Candidate], jobs: int) -> None:
         """Lead models along that have an effect which derivatives do not tell enough of."""
@@ -203,7 +206,16 @@ class TissueTangents:
                     self._model, candidate.effect.name, {**at, p.name: at[p.name] + size}
                 )
                 wanted.append((candidate.key, at, {p.name: size}))
-                work += [self._job(part, changed) for part in self._parts]
+                work += [
+                    PassJob(
+                        self._scene,
+                        changed,
+                        part.trajectory,
+                        part.keyframes.chosen,
+                        derivatives=False,
+                    )
+                    for part in self._parts
+                ]
         found = run_passes(work, self._effects, jobs)
         count = len(self._parts)
         for number, (key, at, step) in enumerate(wanted):
@@ -222,13 +234,9 @@ class TissueTangents:
             along = max(float(column @ residual), 0.0)
             return along**2 / max(float(column @ column), 1e-12)
 
-        return sorted(tangents, key=gain, reverse=True)[:PLACES_TRIED]
-
-    def _job(self, part: TissuePart, model: Extension) -> PassJob:
-        """``model`` led along the keyframes of ``part``, as it is."""
-        return PassJob(
-            self._scene, model, part.trajectory, part.keyframes.chosen, derivatives=False
-        )
+        worth = PROMISING * float(residual @ residual)
+        promising = [tangent for tangent in tangents if gain(tangent) > worth]
+        return sorted(promising, key=gain, reverse=True)[:PLACES_TRIED]
 
     def _onsets_s(self) -> list[float]:
         """Times spread over all in which tissue is held."""
@@ -242,6 +250,18 @@ class TissueTangents:
             return []
         at = np.linspace(0, len(times) - 1, ONSETS + 2)[1:-1]
         return [float(times[int(i)]) for i in at]
+
+    def derivatives(self, candidate: Candidate) -> dict[str, Floats]:
+        """Change (n,) per unit of those free parameters of a candidate that the model has, of which
+        it is known without leading anything along again."""
+        found: dict[str, Floats] = {}
+        if not self._has(candidate):
+            return found
+        for tangent in self.of(candidate):
+            for step, column in zip(tangent.steps, tangent.columns.T, strict=True):
+                ((name, size),) = step.items()
+                found[name] = column / size
+        return found
 
     def _standing(self, candidate: Candidate) -> dict[str, float]:
         """Where the candidate's free parameters stand in the model."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -19,6 +20,9 @@ MOST_FRAMES = 160
 """Frames beyond this many are thinned out evenly: neighbours say nearly the same."""
 _AFTER_RELEASE_S = 1.0
 """Tissue let go swings for a while, and a model in equilibrium cannot know how."""
+_CORNER_M_S = 0.005
+"""Change of a tip's velocity from one set-point to the next that makes a corner of its way."""
+MOST_CORNERS = 60
 _REST = PHASES.index("rest")
 _RELEASED = PHASES.index("after release")
 
@@ -42,6 +46,16 @@ class Trajectory:
     def time_s(self) -> Floats:
         """Of the frames (f,)."""
         return np.asarray(self.motion.time_s[self.frames])
+
+    @cached_property
+    def solved(self) -> Integers:
+        """The instants (m,) of the motion at which the tissue should be known: between two of them
+        it goes about straight on, whichever delay the camera has."""
+        held = np.stack([arm.grasped for arm in self.motion.arms.values()])
+        changes = np.flatnonzero(np.any(held[:, 1:] != held[:, :-1], axis=0))
+        return np.unique(
+            np.concatenate([self.frames, _corners(self.motion), changes, changes + 1])
+        ).astype(np.int64)
 
 
 def trajectory(run: RecordedRun, scene: Scene, most_frames: int = MOST_FRAMES) -> Trajectory:
@@ -73,6 +87,20 @@ def trajectory(run: RecordedRun, scene: Scene, most_frames: int = MOST_FRAMES) -
         {arm: each.at(time_s, within_s) for arm, each in run.measured_m.items()},
         around(run.forces_n),
     )
+
+
+def _corners(motion: RecordedMotion) -> Integers:
+    """Instants at which a tip that holds starts, stops or turns: the sharpest of them."""
+    if len(motion) < 3:
+        return np.zeros(0, np.int64)
+    sharpest = np.zeros(len(motion))
+    for arm in motion.arms.values():
+        velocity = np.diff(arm.position_m, axis=0) / np.diff(motion.time_s)[:, None]
+        change = np.linalg.norm(np.diff(velocity, axis=0), axis=1)
+        held = arm.grasped[:-2] & arm.grasped[2:]
+        sharpest[1:-1] = np.maximum(sharpest[1:-1], np.where(held, change, 0.0))
+    corners = np.flatnonzero(sharpest > _CORNER_M_S)
+    return corners[np.argsort(-sharpest[corners], kind="stable")][:MOST_CORNERS]
 
 
 def _swinging(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from defras_sim.effects.effect import EffectParameter, Values
-from defras_sim.effects.tissue_effect import TissueEffect
+from defras_sim.effects.tissue_effect import NoSuchTissue, TissueEffect
 from defras_sim.scene import Scene
 
 ACCELERATION = "acceleration_m_s2"
@@ -33,13 +33,13 @@ class Gravity(TissueEffect):
             return scene
         total = scene.tissue.gravity_m_s2 + added
         if total < 0:
-            raise ValueError(
+            raise NoSuchTissue(
                 f"gravity: {ACCELERATION} of {added:g} would make the scene's "
                 f"{scene.tissue.gravity_m_s2:g} m/s^2 negative; at least "
                 f"{-scene.tissue.gravity_m_s2:g}"
             )
         if not scene.tissue.bed:
-            raise ValueError("gravity: tissue without a bed has nothing to lie on (tissue.bed)")
+            raise NoSuchTissue("gravity: tissue without a bed has nothing to lie on (tissue.bed)")
         tissue = scene.tissue.model_copy(update={"gravity_m_s2": total})
         return scene.model_copy(update={"tissue": tissue})
 

@@ -22,6 +22,11 @@ from defras_sim.tissue.softened import Part
 from defras_sim.tissue.state import TissueState
 from defras_sim.tissue.terms import Term
 
+
+class NoSuchTissue(ValueError):
+    """Values within their bounds that no tissue can have, as a load that would crush it."""
+
+
 Memory = Any
 """What an evolution knows of the past; never changed once it was handed out."""
 
@@ -125,7 +130,7 @@ class TissueEffect(Effect):
         """What the model is built from.
 
         Raises:
-            ValueError: no such tissue can be.
+            NoSuchTissue: no tissue can be like that.
         """
         return scene
 

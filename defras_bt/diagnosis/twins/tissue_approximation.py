@@ -1,0 +1,60 @@
+"""What the twin itself may be off by: draws of the errors that its mesh and its idea of a jaw make.
+
+Such errors are the same for as long as the tissue is in the same shape, and much the same on
+neighbouring patches. So each draw is a smooth field over the tissue that stays while anything is
+held, and another one for each phase of the motion; forces are off by a share of the largest one.
+Untouched tissue lies where the model says. How large errors are follows from the floors of the
+channels, which say how far models of one and the same tissue on different fine meshes differ: they
+are known before any data.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from defras_bt.diagnosis.problem import Samples
+from defras_bt.diagnosis.twins.tissue_phases import PHASES
+from defras_sim.geometry import Floats
+
+SHARE = 0.5
+"""Of a channel's floor: standard deviation of what is wrong in it."""
+ALIKE_M = 0.02
+"""Distance over which the errors of patches are alike."""
+
+
+def approximation_errors(samples: Samples, count: int, rng: np.random.Generator) -> Floats:
+    """Draws (n, count) of the twin's own errors in the numbers that are compared."""
+    sd = np.array([SHARE * channel.floor for channel in samples.channels])
+    mixed = sd[:, None] * _field(samples)
+    found = np.zeros((len(samples.time_s), count))
+    rest = PHASES.index("rest")
+    for trajectory in np.unique(samples.trajectory):
+        mine = samples.trajectory == trajectory
+        lasting = mixed @ rng.standard_normal((len(sd), count))
+        for phase in np.unique(samples.phase[mine]):
+            if phase == rest:
+                continue
+            passing = mixed @ rng.standard_normal((len(sd), count))
+            rows = mine & (samples.phase == phase)
+            found[rows] = ((lasting + passing) / np.sqrt(2.0))[samples.channel[rows]]
+    return found
+
+
+def _field(samples: Samples) -> Floats:
+    """Matrix (c, c) from independent numbers to one of unit variance for each channel, alike in
+    neighbouring patches of one face, independent otherwise."""
+    count = len(samples.channels)
+    alike = np.eye(count)
+    faces = [channel.name.split(" ")[0] for channel in samples.channels]
+    for face in dict.fromkeys(faces):
+        own = [
+            i
+            for i, channel in enumerate(samples.channels)
+            if faces[i] == face and channel.place_m is not None
+        ]
+        if own:
+            places = np.array([samples.channels[i].place_m for i in own])
+            apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+            alike[np.ix_(own, own)] = np.exp(-((apart / ALIKE_M) ** 2) / 2)
+    value, vector = np.linalg.eigh(alike)
+    return np.asarray(vector * np.sqrt(np.maximum(value, 0.0)))
