@@ -21,7 +21,7 @@ from defras_bt.dvrk.transport.messages import (
 )
 from defras_sim.geometry import Pose
 
-_QUIET_M = 3e-4
+QUIET_M = 3e-4
 """A set-point that moves farther in 0.3 s while nothing is sent here is moved by somebody else."""
 _AFTERWARDS_S = 0.5
 """So long the echo may still show what was sent here before the stream ended."""
@@ -148,7 +148,7 @@ class ArmDrive:
             return standing
         fault = self._echo.fault
         alone = not self.engaged and now_s - self._ended_s > _AFTERWARDS_S
-        if not fault and alone and self._echo.moved_m > _QUIET_M:
+        if not fault and alone and self._echo.moved_m > QUIET_M:
             fault = "is moved by somebody else: its set-point changes while nothing is sent here"
         return Standing(f"{self.arm.name} {fault}" if fault else "", standing.wait)
 

@@ -17,11 +17,12 @@ from defras_bt.dvrk.transport.messages import (
     WRENCHES,
     Message,
 )
-from defras_bt.dvrk.transport.ros1_node import address, join
+from defras_bt.dvrk.transport.ros1_node import address, join, node_lives
 from defras_bt.dvrk.transport.ros_reading import StampOf, joints, pose, state, wrench
 from defras_bt.dvrk.transport.transport import Receive
 from defras_sim.geometry import Pose
 
+_QUEUE = 20
 _COMMANDS = ("servo_cp", "servo_cv", "servo_jp", "servo_jr", "servo_jf", "move_cp", "move_jp")
 
 
@@ -44,16 +45,19 @@ class Ros1:
         self._publishers: dict[tuple[str, str], Any] = {}
         self._making = threading.Lock()
         self._subscribers: list[Any] = []
+        self._newest_s = 0.0
 
     def listen(self, arm: str, topic: str, receive: Receive) -> None:
         kind, read = self._reader(topic)
+
+        def hear(message: Any) -> None:
+            said = read(message, _stamp_s)
+            self._newest_s = max(self._newest_s, said.stamp_s)
+            receive(said)
+
         self._subscribers.append(
             self._rospy.Subscriber(
-                f"/{arm}/{topic}",
-                kind,
-                lambda message: receive(read(message, _stamp_s)),
-                queue_size=1,
-                tcp_nodelay=True,
+                f"/{arm}/{topic}", kind, hear, queue_size=_QUEUE, tcp_nodelay=True
             )
         )
 
@@ -80,7 +84,9 @@ class Ros1:
         self._publisher(arm, "hold", self._std.Empty).publish(self._std.Empty())
 
     def now_s(self) -> float:
-        return float(self._rospy.get_time())
+        now_s = float(self._rospy.get_time())
+        # A simulation's clock comes as messages too, and may come after those that it stamped.
+        return max(now_s, self._newest_s) if self.simulated_clock else now_s
 
     def lost(self) -> str:
         return f"the ROS master at {self._uri} is gone" if self._lifeline.cut else ""
@@ -91,7 +97,9 @@ class Ros1:
             raise OSError(f"the ROS master does not tell who publishes what: {why}")
         topics = {f"/{arm}/{command}" for command in _COMMANDS}
         nodes = {node for topic, whose in state[0] if topic in topics for node in whose}
-        return tuple(sorted(nodes - {self._rospy.get_name()}))
+        others = nodes - {self._rospy.get_name()}
+        # A node that was killed stays on the master's list for ever.
+        return tuple(sorted(node for node in others if node_lives(self._uri, node)))
 
     def close(self) -> None:
         for one in (*self._subscribers, *self._publishers.values()):
@@ -99,6 +107,7 @@ class Ros1:
         self._subscribers.clear()
         self._publishers.clear()
         self._lifeline.close()
+        self._rospy.signal_shutdown("defras has ended")
 
     def _publisher(self, arm: str, topic: str, kind: Any) -> Any:
         found = self._publishers.get((arm, topic))

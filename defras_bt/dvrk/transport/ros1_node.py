@@ -63,6 +63,18 @@ def require_master(uri: str) -> None:
         raise ConnectionFailed(f"{what}: it refused to say who it is ({answer})")
 
 
+def node_lives(uri: str, node: str) -> bool:
+    """Whether a node of the master at ``uri`` answers."""
+    try:
+        found: Any = ServerProxy(uri).lookupNode("/defras", node)
+        if found[0] != 1:
+            return False
+        socket.create_connection(address(found[2]), _ANSWER_S).close()
+    except OSError:
+        return False
+    return True
+
+
 def address(uri: str) -> tuple[str, int]:
     """Host and port of a master's address."""
     parts = urlparse(uri)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import socket
+from collections import defaultdict
 from collections.abc import Mapping
 from threading import Lock, Thread
 from time import monotonic
@@ -50,7 +51,7 @@ class StreamerSocket:
         """
         self._clock = StreamerClock()
         self._clock_lock = Lock()
-        self._receivers: dict[tuple[str, str], Receive] = {}
+        self._receivers: defaultdict[tuple[str, str], list[Receive]] = defaultdict(list)
         self._peers: dict[str, Any] = {}
         self._ended = False
         self.unreadable = 0
@@ -80,7 +81,7 @@ class StreamerSocket:
         return int(self._sockets[arm].getsockname()[1])
 
     def listen(self, arm: str, topic: str, receive: Receive) -> None:
-        self._receivers[arm, topic] = receive
+        self._receivers[arm, topic].append(receive)
 
     def announce(self, arm: str) -> None:
         pass  # commands are simply sent
@@ -139,8 +140,7 @@ class StreamerSocket:
                 if message.stamp_s > 0.0:
                     with self._clock_lock:
                         self._clock.heard(message.stamp_s, received_s)
-                receive = self._receivers.get((arm, topic))
-                if receive is not None:
+                for receive in tuple(self._receivers[arm, topic]):
                     receive(message)
 
 

@@ -1,0 +1,85 @@
+"""Whether cameras show the tissue where it is, now."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from defras_bt.dvrk.camera_source import CameraReadings
+from defras_bt.dvrk.checking.bench import CheckBench
+from defras_bt.dvrk.checking.finding import Finding, ok, warning, wrong
+from defras_bt.sensing.cloud import Workspace
+from defras_bt.sensing.sense import MIN_CLOUD_POINTS
+
+_FLAT_M = 0.01
+_OFF_M = 0.006
+
+
+class CameraCheck:
+    """Age, frame and place of cloud and endoscope."""
+
+    def run(self, bench: CheckBench) -> list[Finding]:
+        readings, now_s = bench.cameras.latest(), bench.cameras.now_s()
+        findings = []
+        if bench.setup.cameras.depth is None:
+            todo = "Without a cloud nothing moves: add cameras.depth to the set-up."
+            findings.append(wrong("camera", "depth", "is not in the set-up", todo))
+        else:
+            findings.append(self._cloud(bench, readings, now_s))
+        if bench.setup.cameras.endoscope is None:
+            todo = "Without it nothing moves: add cameras.endoscope to the set-up."
+            findings.append(wrong("camera", "endoscope", "is not in the set-up", todo))
+        else:
+            findings.append(self._endoscope(bench, readings, now_s))
+        return findings
+
+    def _cloud(self, bench: CheckBench, readings: CameraReadings, now_s: float) -> Finding:
+        fault, cloud = readings.faults.get("cloud", ""), readings.cloud
+        if fault or cloud is None:
+            what = fault or "no cloud of the tissue has come"
+            return wrong(
+                "camera", "depth", what, "defras dvrk cameras calibrate shows what it sees."
+            )
+        age_s, limit_s = now_s - cloud.stamp_s, bench.setup.limits.camera_age_s
+        if not age_s <= limit_s:
+            what = f"its last cloud is {age_s:.2f} s old"
+            todo = f"At most {limit_s:g} s: a faster camera, or fewer points."
+            return wrong("camera", "depth", what, todo)
+        inside = Workspace.of(bench.scene).holds(cloud.points_m)
+        if inside.sum() < MIN_CLOUD_POINTS:
+            what = f"{int(inside.sum())} points lie where tissue can be"
+            return wrong("camera", "depth", what, "Register the camera anew.")
+        return self._place(bench, cloud.points_m[inside], age_s)
+
+    def _place(self, bench: CheckBench, points_m: np.ndarray, age_s: float) -> Finding:
+        """Before the operation tissue lies as the scene has it."""
+        upper = bench.scene.tissue.shape.upper
+        over_m = points_m[:, 2] - upper.at(points_m[:, :2])[:, 2]
+        off_m = float(np.median(over_m))
+        what = f"{len(points_m)} points of tissue, {age_s * 1e3:.0f} ms old, "
+        if abs(off_m) > _OFF_M:
+            side = "above" if off_m > 0.0 else "below"
+            what += f"in the median {abs(off_m) * 1e3:.1f} mm {side} where the tissue rests"
+            return wrong("camera", "depth", what, "Register the camera anew.")
+        if float(np.quantile(np.abs(over_m), 0.9)) > _FLAT_M:
+            what += "but a tenth of them far from where the tissue rests"
+            todo = "Is the tissue at rest, and nothing of its colour beside it?"
+            return warning("camera", "depth", what, todo)
+        what += f"{abs(off_m) * 1e3:.1f} mm from where the tissue rests"
+        return ok("camera", "depth", what)
+
+    def _endoscope(self, bench: CheckBench, readings: CameraReadings, now_s: float) -> Finding:
+        fault = readings.faults.get("endoscope", "")
+        seen, stamp_s = readings.roi_visibility, readings.roi_visibility_stamp_s
+        if fault or seen is None or stamp_s is None:
+            what = fault or "no picture of the region has come"
+            todo = "defras dvrk cameras calibrate shows what it sees."
+            return wrong("camera", "endoscope", what, todo)
+        age_s, limit_s = now_s - stamp_s, bench.setup.limits.camera_age_s
+        if not age_s <= limit_s:
+            todo = f"At most {limit_s:g} s is allowed."
+            return wrong("camera", "endoscope", f"its last picture is {age_s:.2f} s old", todo)
+        if seen >= bench.scene.thresholds.roi_visibility:
+            what = f"sees {seen:.0%} of the region already"
+            todo = "Nothing is to be done, or it takes something else for the region."
+            return warning("camera", "endoscope", what, todo)
+        return ok("camera", "endoscope", f"sees {seen:.0%} of the region, {age_s * 1e3:.0f} ms ago")

@@ -1,0 +1,161 @@
+"""All checks of a laboratory, in the order in which they make sense."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from time import monotonic, sleep
+
+from defras_bt.dvrk.arm_frames import ArmFrames
+from defras_bt.dvrk.checking.arm_state import CommandersCheck, RestCheck, StateCheck
+from defras_bt.dvrk.checking.bench import Check, CheckBench
+from defras_bt.dvrk.checking.cameras import CameraCheck
+from defras_bt.dvrk.checking.computer import DiskCheck
+from defras_bt.dvrk.checking.finding import Finding, ok, warning, wrong
+from defras_bt.dvrk.checking.messages import (
+    ClockCheck,
+    FramesCheck,
+    NamesCheck,
+    RateCheck,
+    UnitsCheck,
+)
+from defras_bt.dvrk.checking.motion import MotionCheck
+from defras_bt.dvrk.checking.registered import RegistrationCheck
+from defras_bt.dvrk.checking.tip import TipCheck
+from defras_bt.dvrk.checking.watch import Watch
+from defras_bt.dvrk.checking.workspace import WorkspaceCheck
+from defras_bt.dvrk.crtk.arm import CrtkArm
+from defras_bt.dvrk.laboratory import open_cameras, registered
+from defras_bt.dvrk.settings import Setup
+from defras_bt.dvrk.streaming.servo_loop import StreamReport
+from defras_bt.dvrk.streaming.servo_process import ServoProcess
+from defras_bt.dvrk.transport.connect import connect
+from defras_sim.scene import Scene
+
+CHECKS: tuple[Check, ...] = (
+    StateCheck(),
+    NamesCheck(),
+    FramesCheck(),
+    UnitsCheck(),
+    TipCheck(),
+    RateCheck(),
+    ClockCheck(),
+    CommandersCheck(),
+    RestCheck(),
+    RegistrationCheck(),
+    WorkspaceCheck(),
+    CameraCheck(),
+    DiskCheck(),
+)
+"""Checks that move nothing."""
+
+LISTEN_S = 4.0
+_CONNECT_S = 2.0
+_P99_SHARE = 0.2
+
+
+@contextmanager
+def check_bench(setup: Setup, scene: Scene, out: Path) -> Iterator[CheckBench]:
+    """Listen to everything for some seconds; what was connected is closed at the end.
+
+    Raises:
+        NotRegistered: arms or cameras are not registered.
+        RosMissing: ROS is not installed.
+        ConnectionFailed: somebody does not answer.
+    """
+    registration = registered(setup, scene)
+    cameras = open_cameras(setup, registration, scene)
+    try:
+        transport = connect(setup, "defras_check")
+        try:
+            arms = {name: CrtkArm(arm, transport) for name, arm in setup.arms.items()}
+            # While connections are being made, topics come late and one after the other.
+            sleep(_CONNECT_S)
+            watches = {name: Watch(arm.name, transport) for name, arm in setup.arms.items()}
+            sleep(LISTEN_S)
+            yield CheckBench(
+                setup,
+                scene,
+                registration,
+                transport,
+                {name: arms[name] for name in setup.arms},
+                {name: watches[name] for name in setup.arms},
+                cameras,
+                out,
+            )
+        finally:
+            transport.close()
+    finally:
+        cameras.close()
+
+
+def run_checks(bench: CheckBench, tell: Callable[[Finding], None]) -> list[Finding]:
+    """Findings of all checks that move nothing; each is told as it comes."""
+    findings = []
+    for check in CHECKS:
+        for finding in check.run(bench):
+            tell(finding)
+            findings.append(finding)
+    return findings
+
+
+def run_motion(bench: CheckBench, tell: Callable[[Finding], None]) -> list[Finding]:
+    """Move every arm 2 mm along each axis; only after the operator's approval.
+
+    Raises:
+        ConnectionFailed: the stream cannot connect.
+    """
+    setup = bench.setup
+    servo = ServoProcess(setup)
+    try:
+        sleep(_CONNECT_S)
+        frames = {
+            name: ArmFrames.of(arm, bench.registration.arms[name].pose)
+            for name, arm in setup.arms.items()
+        }
+        check = MotionCheck(
+            servo,
+            {name: frames[name] for name in setup.arms},
+            {name: arm.name for name, arm in setup.arms.items()},
+            pause=partial(_pause, servo),
+        )
+        findings = check.run()
+        findings.append(_regularity(servo.report()))
+    finally:
+        servo.close()
+    for finding in findings:
+        tell(finding)
+    return findings
+
+
+def _pause(servo: ServoProcess, time_s: float) -> None:
+    """Let ``time_s`` of the robot's time pass, at most ten times as much of ours."""
+    if not servo.simulated_clock:
+        sleep(time_s)
+        return
+    until_s, latest_s = servo.clock_s() + time_s, monotonic() + 10.0 * time_s
+    while servo.clock_s() < until_s - 1e-6 and monotonic() < latest_s:
+        sleep(0.002)
+
+
+def _regularity(report: StreamReport) -> Finding:
+    period = report.period
+    if report.broke:
+        return wrong("stream", "computer", report.broke, "This is a fault of defras: report it.")
+    if period.p99_s is None:
+        return wrong("stream", "computer", "no set-point was sent", "See the findings of motion.")
+    longest_s = period.longest_s or 0.0
+    what = (
+        f"99 of 100 set-points came within {period.p99_s * 1e3:.1f} ms of the one before, the last "
+        f"within {longest_s * 1e3:.1f} ms (nominal {period.nominal_s * 1e3:g} ms"
+        f"{', real-time scheduling' if report.realtime else ''})"
+    )
+    if period.p99_s <= (1.0 + _P99_SHARE) * period.nominal_s:
+        return ok("stream", "computer", what)
+    todo = (
+        "Free this computer, or let the stream run before other programs "
+        "(stream.realtime_priority; limits.conf: rtprio)."
+    )
+    return warning("stream", "computer", what, todo)
