@@ -120,17 +120,20 @@ class MotionCheck:
     def _jaw(self, arm: str, name: str) -> Finding:
         """Open a little and back; a jaw of the wrong sign closes instead."""
         before_rad = self._jaw_rad(arm)
-        for goal_rad in (before_rad + JAW_STROKE_RAD, max(before_rad, 1e-3)):
-            for _ in range(10):
-                self._servo.command(Tick({arm: ArmMotion(jaw_rad=goal_rad)}, TICK_S))
-                self._pause(TICK_S)
-            if goal_rad > before_rad:
-                opened_rad = self._jaw_rad(arm) - before_rad
+        opened_rad = self._jaw_at(arm, before_rad + JAW_STROKE_RAD) - before_rad
+        self._jaw_at(arm, before_rad)
         if abs(opened_rad - JAW_STROKE_RAD) <= 0.3 * JAW_STROKE_RAD:
             return ok("jaw", name, f"opened by {opened_rad:.2f} rad when told {JAW_STROKE_RAD:g}")
         what = f"its jaw turned by {opened_rad:+.2f} rad when told {JAW_STROKE_RAD:+g}"
         todo = "Opening must count positive (CRTK); see the driver's tool file, or free the jaw."
         return wrong("jaw", name, what, todo)
+
+    def _jaw_at(self, arm: str, goal_rad: float) -> float:
+        """Send the jaw to ``goal_rad``; where it is some time later."""
+        for _ in range(round(_SETTLE_S / TICK_S)):
+            self._servo.command(Tick({arm: ArmMotion(jaw_rad=goal_rad)}, TICK_S))
+            self._pause(TICK_S)
+        return self._jaw_rad(arm)
 
     def _tip_m(self, arm: str) -> Floats:
         measured = self._heard(arm).measured

@@ -21,7 +21,7 @@ from defras_bt.dvrk.checking.messages import (
     RateCheck,
     UnitsCheck,
 )
-from defras_bt.dvrk.checking.motion import MotionCheck
+from defras_bt.dvrk.checking.motion import MotionCheck, Stopped
 from defras_bt.dvrk.checking.registered import RegistrationCheck
 from defras_bt.dvrk.checking.tip import TipCheck
 from defras_bt.dvrk.checking.watch import Watch
@@ -54,6 +54,7 @@ CHECKS: tuple[Check, ...] = (
 LISTEN_S = 4.0
 _CONNECT_S = 2.0
 _P99_SHARE = 0.2
+_CLOCK_STANDS_S = 10.0
 
 
 @contextmanager
@@ -131,12 +132,18 @@ def run_motion(bench: CheckBench, tell: Callable[[Finding], None]) -> list[Findi
 
 
 def _pause(servo: ServoProcess, time_s: float) -> None:
-    """Let ``time_s`` of the robot's time pass, at most ten times as much of ours."""
+    """Let ``time_s`` of the robot's time pass.
+
+    Raises:
+        Stopped: the robot is simulated, and its clock stands still.
+    """
     if not servo.simulated_clock:
         sleep(time_s)
         return
-    until_s, latest_s = servo.clock_s() + time_s, monotonic() + 10.0 * time_s
-    while servo.clock_s() < until_s - 1e-6 and monotonic() < latest_s:
+    until_s, latest_s = servo.clock_s() + time_s, monotonic() + _CLOCK_STANDS_S
+    while servo.clock_s() < until_s - 1e-6:
+        if monotonic() > latest_s:
+            raise Stopped(f"the simulation's clock stands still for {_CLOCK_STANDS_S:g} s")
         sleep(0.002)
 
 
