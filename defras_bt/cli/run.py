@@ -12,12 +12,20 @@ import typer
 from rich.console import Console
 
 from defras_bt.cli.at_the_desk import at_the_desk
+from defras_bt.cli.dvrk_laboratory import checked_laboratory, connected
 from defras_bt.cli.errors import OUTCOME_CODES, ExitCode, UserError
 from defras_bt.cli.files import find, find_scene, folder_for
 from defras_bt.cli.interrupts import Interrupts
 from defras_bt.cli.plan import rehearsed, tell
 from defras_bt.executive.deadline import LONGEST_RECOVERY_S, interrupting
-from defras_bt.executive.operation import WORLDS, Operation, operate
+from defras_bt.executive.operation import (
+    ROBOT_WORLD,
+    WORLDS,
+    Operation,
+    operate,
+    operate_in,
+    random_generators,
+)
 from defras_bt.executive.operator_desk import OperatorDesk
 from defras_bt.executive.proof.prover import prove
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, read_substitutes
@@ -45,7 +53,12 @@ def run(
     actual: Annotated[
         str | None, typer.Option(help="Scene as it really is; default: as believed.")
     ] = None,
-    world: Annotated[str, typer.Option(help="model (fast) or bullet (PyBullet).")] = "model",
+    world: Annotated[
+        str, typer.Option(help="model (fast), bullet (PyBullet) or dvrk (a robot; needs --setup).")
+    ] = "model",
+    setup: Annotated[
+        Path | None, typer.Option(help="Set-up file of the laboratory, for --world dvrk.")
+    ] = None,
     tree: Annotated[str, typer.Option(help="Tree: a file, or a shipped name.")] = "defras",
     plan: Annotated[
         Path | None, typer.Option(help="Plan file of defras plan; default: rehearse now.")
@@ -74,13 +87,22 @@ def run(
     goal reached but not everything could be recorded. Ctrl-C stops the arms and asks a human. A
     tree that is not proved safe (see defras tree prove) is not run.
 
+    On a robot (--world dvrk --setup FILE) a passed check of the same set-up and scene has to be
+    there that is not too old: see defras dvrk check.
+
     While it runs, keys and "defras operator" pause, resume, stop, take over and hand back.
 
     Example: defras run demo --actual demo_actual --world bullet --out out/demo
     """
-    if world not in WORLDS:
-        raise UserError(f"--world {world}: valid are {', '.join(WORLDS)}")
+    if world not in (*WORLDS, ROBOT_WORLD):
+        raise UserError(f"--world {world}: valid are {', '.join((*WORLDS, ROBOT_WORLD))}")
     scene_file, believed = find_scene(scene)
+    laboratory = None
+    if world == ROBOT_WORLD:
+        _require_no_trial(actual=actual, substitute=substitute, faults=faults)
+        laboratory = checked_laboratory(setup, believed)
+    elif setup is not None:
+        raise UserError(f"--setup {setup}: only --world {ROBOT_WORLD} has a laboratory")
     actual_file, truth = find_scene(actual) if actual is not None else (None, believed)
     _require_same_set_up(believed, truth)
     tree_file = find(tree, "trees")
@@ -104,7 +126,7 @@ def run(
         tell(prepared.result, console)
     operation = Operation(
         scene=believed,
-        actual=truth,
+        actual=truth if laboratory is None else None,
         scene_file=str(scene_file),
         actual_file=str(actual_file) if actual_file else None,
         world=world,
@@ -128,12 +150,16 @@ def run(
         )
     recorded = file_recorders(out) if out is not None else ()
     recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console), *recorded]
-    desk = OperatorDesk(asks=approve, idle_s=believed.tick_s)
+    # A robot's time passes by itself; a simulated one must not race while a human thinks.
+    desk = OperatorDesk(asks=approve, idle_s=believed.tick_s if laboratory is None else 0.0)
     interrupts = Interrupts(desk, last_deed=True)
+    operating = partial(operate, operation)
+    if laboratory is not None:
+        robot = connected(laboratory, believed, out)
+        operating = partial(operate_in, robot, operation, random_generators(seed)[1])
     try:
         with at_the_desk(desk, console, out, asks=approve), interrupts.heeded():
-            summary = operate(
-                operation,
+            summary = operating(
                 recorders,
                 operator=desk,
                 faults=FaultInjection(injected, believed, seed),
@@ -215,6 +241,20 @@ def _require_safe(tree: TreeSpec, named: str) -> None:
             f"--tree {named}: not run, because it is not proved that {claims}. "
             f"`defras tree prove {named}` shows the ticks that break it and the node at fault"
         )
+
+
+def _require_no_trial(**options: str | Path | None) -> None:
+    """Nothing is tried out on a robot.
+
+    Raises:
+        UserError: an option of simulated worlds was given.
+    """
+    for option, given in options.items():
+        if given is not None:
+            raise UserError(
+                f"--{option} {given}: in simulated worlds ({', '.join(WORLDS)}) only; a robot's "
+                "patient is what it is"
+            )
 
 
 def _require_same_set_up(believed: Scene, truth: Scene) -> None:

@@ -31,21 +31,24 @@ from defras_bt.recording.versions import versions
 from defras_sim.retraction import GraspPoint, Rehearsal, Rehearser
 from defras_sim.scene import Scene
 from defras_sim.worlds.model_world import ModelWorld
-from defras_sim.worlds.protocol import World
+from defras_sim.worlds.protocol import StreamsSetpoints, World
 
 SIMULATED_WORLDS = ("model", "bullet")
 WORLDS = SIMULATED_WORLDS
+ROBOT_WORLD = "dvrk"
+"""Not made here: a robot is connected to by who knows the laboratory."""
 
 
 @dataclass(frozen=True)
 class Operation:
-    """What to run. ``scene`` is believed, ``actual`` is there; the files are for the record.
+    """What to run. ``scene`` is believed, ``actual`` is there, None where nobody knows it; the
+    files are for the record.
 
     ``substitutes`` replace nodes of the tree, for trials in simulated worlds.
     """
 
     scene: Scene
-    actual: Scene
+    actual: Scene | None
     scene_file: str
     actual_file: str | None
     world: str
@@ -93,6 +96,8 @@ def operate(
     """
     if operation.substitutes.entries and operation.world not in SIMULATED_WORLDS:
         raise ValueError(f"nodes can be substituted in {', '.join(SIMULATED_WORLDS)} only")
+    if operation.actual is None:
+        raise ValueError("a simulated world needs to know what is really there")
     world_rng, learning_rng = random_generators(operation.seed)
     believed = operation.scene.for_bullet() if operation.world == "bullet" else operation.scene
     world = make_world(operation.world, operation.actual, world_rng)
@@ -173,7 +178,8 @@ def operate_in(
                 outcome = board.outcome or "error"
                 summary = RunSummary({"outcome": outcome})
                 try:
-                    summary = summary_recorder.summary(outcome, wall_s)
+                    stream = world.stream_values() if isinstance(world, StreamsSetpoints) else None
+                    summary = summary_recorder.summary(outcome, wall_s, stream)
                 finally:
                     # Without its numbers too, what was recorded is closed properly.
                     recorder.finish(summary)

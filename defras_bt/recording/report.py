@@ -136,7 +136,38 @@ def _tiles(values: Any) -> list[Tile]:
             f"world time; {values['wall_s']:.0f} s on the clock",
         ),
         *acts,
+        *_stream_tiles(values.get("stream")),
     ]
+
+
+def _stream_tiles(stream: Any) -> list[Tile]:
+    """How set-points were streamed to real arms; none for a simulated world."""
+    if stream is None or stream["period"]["p99_s"] is None:
+        return []
+    period = stream["period"]
+    late = period["p99_s"] > 1.2 * period["nominal_s"]
+    regular = Tile(
+        "Between set-points",
+        _milliseconds(period["p99_s"]),
+        f"99 of 100; nominal {_milliseconds(period['nominal_s'])}, longest "
+        f"{_milliseconds(period['longest_s'])}",
+        "bad" if late else "plain",
+    )
+    ways = [
+        f"{sensor} {_milliseconds(way['median_s'])} ({_milliseconds(way['p99_s'])})"
+        for sensor, way in stream["latency"].items()
+    ]
+    if not ways:
+        return [regular]
+    slowest = max(way["median_s"] for way in stream["latency"].values())
+    return [
+        regular,
+        Tile("Sensor to command", _milliseconds(slowest), f"median (99 of 100): {', '.join(ways)}"),
+    ]
+
+
+def _milliseconds(time_s: float) -> str:
+    return f"{time_s * 1e3:.1f} ms"
 
 
 def _panels(log: RunLog) -> list[Panel]:

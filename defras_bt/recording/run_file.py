@@ -60,6 +60,39 @@ class OperatorLog(BaseModel):
     held_s: Seconds = Field(description="world time paused or taken over")
 
 
+class Durations(BaseModel):
+    """How long something took, over a whole run."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    median_s: Seconds
+    p99_s: Seconds
+
+
+class Period(BaseModel):
+    """Times between set-points, while any were sent."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    nominal_s: Seconds
+    count: Count
+    median_s: Seconds | None
+    p99_s: Seconds | None
+    longest_s: Seconds | None
+
+
+class StreamLog(BaseModel):
+    """The stream of set-points to real arms."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    period: Period
+    latency: dict[str, Durations] = Field(
+        description="by sensor: from the stamp of a reading to the first set-point decided on it"
+    )
+    taken_up: Durations | None = Field(
+        description="from sending a set-point to the arm's echo of it; null if none came back"
+    )
+    realtime: bool = Field(description="whether the system let the stream run before others")
+
+
 class RunFile(BaseModel):
     """What one run came to."""
 
@@ -88,6 +121,9 @@ class RunFile(BaseModel):
     versions: dict[str, str]
     substituted: list[str] = Field(
         description="paths of nodes replaced by scripts; the run was a trial"
+    )
+    stream: StreamLog | None = Field(
+        description="how set-points were streamed; null for simulated worlds"
     )
 
 

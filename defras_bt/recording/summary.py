@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from defras_bt.recording.record import Cause, RunInfo, RunSummary, TickRecord
 from defras_bt.recording.run_file import Outcome, RunFile
@@ -50,8 +52,13 @@ class SummaryRecorder:
         self._count_warnings(record)
         self._count_force(record)
 
-    def summary(self, outcome: Outcome, wall_s: float) -> RunSummary:
-        """What the run came to so far; keys and meaning are those of :class:`RunFile`."""
+    def summary(
+        self, outcome: Outcome, wall_s: float, stream: Mapping[str, Any] | None = None
+    ) -> RunSummary:
+        """What the run came to so far; keys and meaning are those of :class:`RunFile`.
+
+        ``stream``: how the stream of set-points to real arms went, None for simulated worlds.
+        """
         info = self._started()
         file = RunFile.model_validate(
             {
@@ -84,6 +91,7 @@ class SummaryRecorder:
                 "tree": info.tree,
                 "versions": dict(info.versions),
                 "substituted": list(info.substituted),
+                "stream": stream,
             }
         )
         return RunSummary(file.model_dump(by_alias=True))

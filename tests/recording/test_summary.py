@@ -40,6 +40,7 @@ PROMISED = {
     "tree",
     "versions",
     "substituted",
+    "stream",
 }
 
 
@@ -90,6 +91,7 @@ def test_what_nobody_knows_is_null(short_run: SyntheticRun) -> None:
         "force_mean_n",
         "force_max_true_n",
         "actual",
+        "stream",
     ]
 
 
@@ -137,3 +139,13 @@ def test_the_reason_and_the_operator_s_acts_are_kept(short_run: SyntheticRun) ->
     assert values["reason"] == {"code": "stopped", "sentence": "the operator asked to stop"}
     assert values["operator"]["acts"] == [{"time_s": first.time_s, **pause}]
     assert values["operator"]["held_s"] == pytest.approx(2 * short_run.info.scene.tick_s)
+
+
+def test_how_setpoints_were_streamed_is_kept(short_run: SyntheticRun) -> None:
+    way = {"median_s": 0.015, "p99_s": 0.03}
+    period = {**way, "nominal_s": 0.01, "count": 4000, "longest_s": 0.05}
+    stream = {"period": period, "latency": {"psm1": way}, "taken_up": None, "realtime": True}
+    recorder = SummaryRecorder()
+    recorder.start(short_run.info)
+    values = recorder.summary("goal", wall_s=1.0, stream=stream).values
+    assert values["stream"] == stream

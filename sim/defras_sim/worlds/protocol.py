@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,3 +162,12 @@ class World(Protocol):
 
     def close(self) -> None:
         """Let go of all resources; motion is zero from here on."""
+
+
+@runtime_checkable
+class StreamsSetpoints(Protocol):
+    """A world that drives real arms, and can tell how regularly."""
+
+    def stream_values(self) -> Mapping[str, Any] | None:
+        """The key ``stream`` of ``run.json``: periods and latencies so far; None where nobody can
+        tell."""
