@@ -156,7 +156,7 @@ class ArmDrive:
         if self.engaged:
             # Another client's motion ends as well: two that drive one arm are never right.
             self.arm.hold()
-        self._told = why
+        self._told = self._told or why
         self.end(now_s)
 
     def _pursue_jaw(self, jaw_rad: float) -> None:

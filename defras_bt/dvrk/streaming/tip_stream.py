@@ -12,7 +12,9 @@ from defras_bt.dvrk.streaming.approach import Approach, ApproachLimits
 from defras_sim.geometry import Floats, Pose
 
 _CATCH_UP = 1.2
-"""So much faster than commanded the stream may go to make good what a late command cost."""
+"""So much faster than commanded the stream may go to make good what it is behind."""
+_BEHIND_TICKS = 0.5
+"""So much it stays behind: a command that comes a little late finds it still moving."""
 _SLOWER = 0.999
 _SAME_WAY = 0.9
 _MOST_TICKS_BEHIND = 2.0
@@ -34,7 +36,7 @@ class TipStream:
     """Turns velocities for a tick each into poses for a period each.
 
     A command adds its way to where the tip was sent before: silence is a hold, and a command that
-    comes a little late costs nothing, because the stream catches up. One that is slower than the
+    comes a little late costs nothing, because the stream is a little behind. One that is slower than the
     last, or goes elsewhere, counts from where the stream is, and so slows it with the next
     set-point. No command at all stops it as braking allows.
     """
@@ -116,4 +118,5 @@ def _follow(approach: Approach, wanted: Floats, last: Floats, tick_s: float) -> 
     length = float(np.linalg.norm(ahead))
     if length > most:
         goal = approach.at + ahead * (most / length)
-    approach.pursue(goal, _CATCH_UP * speed)
+    behind = length > (1.0 + _BEHIND_TICKS) * speed * tick_s
+    approach.pursue(goal, _CATCH_UP * speed if behind else speed)
