@@ -78,6 +78,11 @@ class DvrkWorld:
     def time_s(self) -> float:
         return self._clock.now_s()
 
+    @property
+    def begin_stamp_s(self) -> float:
+        """The robot's time at which world time is 0."""
+        return self._clock.begin_s
+
     def observe(self) -> Observation:
         return self._latest
 
@@ -121,12 +126,12 @@ class DvrkWorld:
 
     def stream_values(self) -> Mapping[str, Any] | None:
         """How the stream of set-points went, for ``run.json``; None where nobody can tell."""
-        if self._report is None:
-            try:
-                self._report = stream_values(self._servo.report())
-            except ServoLost:
-                return None
-        return self._report
+        if self._report is not None:
+            return self._report
+        try:
+            return stream_values(self._servo.report())
+        except ServoLost:
+            return None
 
     def close(self) -> None:
         """Stop both arms and listen no more; grips stay as they are."""
