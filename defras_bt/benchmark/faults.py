@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import pickle
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,6 +43,7 @@ LONGEST_HANG_S = 5.0
 # So often the patient is held in more places than believed: learning takes its time.
 MORE_EVERY = 5
 _KILLED_WITHIN_S = 300.0
+_TOO_LONG = 124
 # How a run ends that the executive ended itself.
 _DECIDED = ("goal", "human", "not_reached")
 _BROKEN_RECORDERS = {"timeline": (TIMELINE,), "recording": (RECORDING,)}
@@ -131,28 +134,39 @@ def _judged_killed(operation: Operation, faults: Faults, out: Path) -> Verdict:
 
     A run that reached its outcome before it would have been killed is judged by its end.
     """
-    context = multiprocessing.get_context("spawn")
-    process = context.Process(target=_until_killed, args=(operation, faults, out))
-    process.start()
-    process.join(_KILLED_WITHIN_S)
-    if process.is_alive():
-        process.kill()
-        process.join()
+    exit_code = _run_apart(operation, faults, out)
     killed_s = faults.faults[0].start_s
-    if process.exitcode == 0:
+    if exit_code == 0:
         numbers = read_run_json(out / NUMBERS)
         end_s, outcome = numbers.duration_s, numbers.outcome
         if end_s < killed_s:
             lost = lost_recordings(out, dict.fromkeys((TIMELINE, RECORDING, NUMBERS), end_s))
             why = "the run ended before it would have been killed"
             return Verdict(outcome, why, 0, False, 0, 0, 0, tuple(lost), "")
-    by_signal = process.exitcode == -signal.SIGKILL
-    broke = "" if by_signal else f"it ended with exit code {process.exitcode}, not killed"
+    by_signal = exit_code == -signal.SIGKILL
+    broke = "" if by_signal else f"it ended with exit code {exit_code}, not killed"
     lost = lost_recordings(out, {TIMELINE: killed_s, RECORDING: killed_s})
     return Verdict("killed", "the process was killed", 0, True, 0, 0, 0, tuple(lost), broke)
 
 
-def _until_killed(operation: Operation, faults: Faults, out: Path) -> None:
+def _run_apart(operation: Operation, faults: Faults, out: Path) -> int:
+    """Exit code of a Python process that only does this; negative: the signal that ended it.
+
+    Not one of multiprocessing's: those cannot be started by every kind of worker.
+    """
+    order = out / "order.pickle"
+    order.write_bytes(pickle.dumps((operation, faults, out)))
+    command = [sys.executable, "-m", __name__, str(order)]
+    try:
+        return subprocess.run(command, timeout=_KILLED_WITHIN_S, check=False).returncode
+    except subprocess.TimeoutExpired:
+        return _TOO_LONG
+    finally:
+        order.unlink()
+
+
+def _until_killed(order: Path) -> None:
+    operation, faults, out = pickle.loads(order.read_bytes())
     injection = FaultInjection(faults, operation.scene, operation.seed)
     _operate(operation, injection, out, Witness())
 
@@ -227,3 +241,7 @@ def _endings(kind: str, tripped: bool) -> tuple[str, ...]:
     if kind == Killed.kind:
         return ("killed",) if tripped else _DECIDED
     return (*_DECIDED, "error") if KINDS[kind].ends_runs_with else _DECIDED
+
+
+if __name__ == "__main__":
+    _until_killed(Path(sys.argv[1]))

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from joblib import Parallel, delayed
 
 from defras_bt.benchmark.fault_cases import drawn_fault
 from defras_bt.benchmark.fault_judge import Moment, Witness, late_motion, lost_recordings, verdict
@@ -162,4 +163,10 @@ def test_a_run_that_ends_before_it_would_be_killed_is_judged_by_its_end(
     run = fault_run("killed", 0, PREPARED, "fras")
     assert run.verdict.outcome in ("goal", "human", "not_reached")
     assert (run.verdict.lost, run.verdict.broke) == ((), "")
+    assert passed([run])
+
+
+def test_a_run_is_killed_in_a_worker_too() -> None:
+    (run,) = Parallel(n_jobs=2)([delayed(fault_run)("killed", 0, PREPARED, "fras")])
+    assert run.verdict.outcome == "killed"
     assert passed([run])
