@@ -12,6 +12,7 @@ from defras_sim.scene import Scene
 if TYPE_CHECKING:
     from defras_bt.dvrk.settings import Setup
     from defras_bt.dvrk.world import DvrkWorld
+    from defras_bt.recording.record import Recorder
 
 
 def checked_laboratory(file: Path | None, scene: Scene) -> Setup:
@@ -53,3 +54,11 @@ def connected(setup: Setup, scene: Scene, out: Path | None) -> DvrkWorld:
         return open_world(setup, scene, out)
     except (NotRegistered, RosMissing, ConnectionFailed, ServoLost) as error:
         raise UserError(f"--world dvrk: {error}") from error
+
+
+def told_to_ros(setup: Setup, robot: DvrkWorld) -> list[Recorder]:
+    """What tells a run to the robot's ROS, so that a bag of its topics holds all of it."""
+    from defras_bt.dvrk.ros_recorder import RosRecorder
+
+    has_node = setup.transport.kind == "ros1" and setup.cameras.depth is not None
+    return [RosRecorder(robot.begin_stamp_s)] if has_node else []

@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from defras_bt.cli.at_the_desk import at_the_desk
-from defras_bt.cli.dvrk_laboratory import checked_laboratory, connected
+from defras_bt.cli.dvrk_laboratory import checked_laboratory, connected, told_to_ros
 from defras_bt.cli.errors import OUTCOME_CODES, ExitCode, UserError
 from defras_bt.cli.files import find, find_scene, folder_for
 from defras_bt.cli.interrupts import Interrupts
@@ -156,6 +156,7 @@ def run(
     operating = partial(operate, operation)
     if laboratory is not None:
         robot = connected(laboratory, believed, out)
+        recorders += told_to_ros(laboratory, robot)
         operating = partial(operate_in, robot, operation, random_generators(seed)[1])
     try:
         with at_the_desk(desk, console, out, asks=approve), interrupts.heeded():

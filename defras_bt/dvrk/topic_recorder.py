@@ -14,6 +14,9 @@ from defras_bt.dvrk.ros_packages import ros_module
 _LARGEST_MESSAGE = 2**25
 _QUEUE = 1000
 
+_OF_ROS = ("/rosout", "/rosout_agg", "/clock")
+"""Left out: logs, and the simulated clock, which every message is written at anyway."""
+
 
 class TopicRecorder:
     """Records from its making to :meth:`close`; the process must be a ROS node already.
@@ -29,7 +32,7 @@ class TopicRecorder:
             OSError: the file cannot be written, or exists.
         """
         self._rospy = ros_module("rospy")
-        self._without = {"/rosout", "/rosout_agg", *without}
+        self._without = {*_OF_ROS, *without}
         self._lock = Lock()
         self._connections: dict[tuple[str, str], Any] = {}
         self._subscribers: dict[str, Any] = {}

@@ -18,7 +18,7 @@ class WorldClock:
 
     def __init__(self, begin_s: float, tick_s: float, *, simulated: bool) -> None:
         """``simulated``: the robot's clock is a simulation's; only looking at it tells the time."""
-        self._begin_s = begin_s
+        self.begin_s = begin_s
         self._tick_s = tick_s
         self._simulated = simulated
         self._looked_s, self._seen_s = monotonic(), begin_s
@@ -27,7 +27,7 @@ class WorldClock:
 
     def world_s(self, stamp_s: float) -> float:
         """World time of a stamp."""
-        return stamp_s - self._begin_s
+        return stamp_s - self.begin_s
 
     def looked(self, clock_s: float) -> None:
         """The robot's clock shows ``clock_s`` now."""
@@ -36,7 +36,7 @@ class WorldClock:
     def now_s(self) -> float:
         """World time now."""
         passed_s = 0.0 if self._simulated else monotonic() - self._looked_s
-        return self._seen_s - self._begin_s + passed_s
+        return self._seen_s - self.begin_s + passed_s
 
     def wait_for_tick(self, look: Callable[[], float]) -> None:
         """Wait until the next tick is due. ``look`` tells the robot's clock; it is only asked
@@ -47,7 +47,7 @@ class WorldClock:
             return
         began_s = monotonic()
         self._due_world_s += self._tick_s
-        while (now_s := look() - self._begin_s) < self._due_world_s - 1e-6:
+        while (now_s := look() - self.begin_s) < self._due_world_s - 1e-6:
             if monotonic() - began_s > 10.0 * self._tick_s:
                 break
             sleep(_LOOK_S)
