@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from defras_bt.dvrk.camera_source import CameraSource
+from defras_bt.dvrk.camera_source import CameraReadings, CameraSource
 from defras_bt.dvrk.checking.finding import Finding
 from defras_bt.dvrk.checking.watch import Watch
 from defras_bt.dvrk.crtk.arm import CrtkArm
@@ -19,8 +19,8 @@ from defras_sim.scene import Scene
 
 @dataclass(frozen=True)
 class CheckBench:
-    """``watches`` have listened for some seconds when checks are run. ``out``: where recordings
-    will go."""
+    """``watches`` have listened for some seconds when checks are run, and ``looks`` are what the
+    cameras showed meanwhile, each with their clock's time. ``out``: where recordings will go."""
 
     setup: Setup
     scene: Scene
@@ -29,6 +29,7 @@ class CheckBench:
     arms: Mapping[str, CrtkArm]
     watches: Mapping[str, Watch]
     cameras: CameraSource
+    looks: Sequence[tuple[CameraReadings, float]]
     out: Path
 
 

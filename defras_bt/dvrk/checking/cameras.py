@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from defras_bt.dvrk.camera_source import CameraReadings
@@ -18,30 +20,30 @@ class CameraCheck:
     """Age, frame and place of cloud and endoscope."""
 
     def run(self, bench: CheckBench) -> list[Finding]:
-        readings, now_s = bench.cameras.latest(), bench.cameras.now_s()
+        readings, _ = bench.looks[-1]
         findings = []
         if bench.setup.cameras.depth is None:
             todo = "Without a cloud nothing moves: add cameras.depth to the set-up."
             findings.append(wrong("camera", "depth", "is not in the set-up", todo))
         else:
-            findings.append(self._cloud(bench, readings, now_s))
+            findings.append(self._cloud(bench, readings))
         if bench.setup.cameras.endoscope is None:
             todo = "Without it nothing moves: add cameras.endoscope to the set-up."
             findings.append(wrong("camera", "endoscope", "is not in the set-up", todo))
         else:
-            findings.append(self._endoscope(bench, readings, now_s))
+            findings.append(self._endoscope(bench, readings))
         return findings
 
-    def _cloud(self, bench: CheckBench, readings: CameraReadings, now_s: float) -> Finding:
+    def _cloud(self, bench: CheckBench, readings: CameraReadings) -> Finding:
         fault, cloud = readings.faults.get("cloud", ""), readings.cloud
         if fault or cloud is None:
             what = fault or "no cloud of the tissue has come"
             return wrong(
                 "camera", "depth", what, "defras dvrk cameras calibrate shows what it sees."
             )
-        age_s, limit_s = now_s - cloud.stamp_s, bench.setup.limits.camera_age_s
+        age_s, limit_s = _age_s(bench, _cloud_stamp_s), bench.setup.limits.camera_age_s
         if not age_s <= limit_s:
-            what = f"its last cloud is {age_s:.2f} s old"
+            what = f"its clouds are {age_s:.2f} s old in the median when they are needed"
             todo = f"At most {limit_s:g} s: a faster camera, or fewer points."
             return wrong("camera", "depth", what, todo)
         inside = Workspace.of(bench.scene).holds(cloud.points_m)
@@ -55,7 +57,7 @@ class CameraCheck:
         upper = bench.scene.tissue.shape.upper
         over_m = points_m[:, 2] - upper.at(points_m[:, :2])[:, 2]
         off_m = float(np.median(over_m))
-        what = f"{len(points_m)} points of tissue, {age_s * 1e3:.0f} ms old, "
+        what = f"{len(points_m)} points of tissue, {age_s * 1e3:.0f} ms old in the median, "
         if abs(off_m) > _OFF_M:
             side = "above" if off_m > 0.0 else "below"
             what += f"in the median {abs(off_m) * 1e3:.1f} mm {side} where the tissue rests"
@@ -67,19 +69,34 @@ class CameraCheck:
         what += f"{abs(off_m) * 1e3:.1f} mm from where the tissue rests"
         return ok("camera", "depth", what)
 
-    def _endoscope(self, bench: CheckBench, readings: CameraReadings, now_s: float) -> Finding:
+    def _endoscope(self, bench: CheckBench, readings: CameraReadings) -> Finding:
         fault = readings.faults.get("endoscope", "")
-        seen, stamp_s = readings.roi_visibility, readings.roi_visibility_stamp_s
-        if fault or seen is None or stamp_s is None:
+        seen = readings.roi_visibility
+        if fault or seen is None:
             what = fault or "no picture of the region has come"
             todo = "defras dvrk cameras calibrate shows what it sees."
             return wrong("camera", "endoscope", what, todo)
-        age_s, limit_s = now_s - stamp_s, bench.setup.limits.camera_age_s
+        age_s = _age_s(bench, lambda look: look.roi_visibility_stamp_s)
+        limit_s = bench.setup.limits.camera_age_s
         if not age_s <= limit_s:
-            todo = f"At most {limit_s:g} s is allowed."
-            return wrong("camera", "endoscope", f"its last picture is {age_s:.2f} s old", todo)
+            what = f"its pictures are {age_s:.2f} s old in the median when they are needed"
+            return wrong("camera", "endoscope", what, f"At most {limit_s:g} s is allowed.")
         if seen >= bench.scene.thresholds.roi_visibility:
             what = f"sees {seen:.0%} of the region already"
             todo = "Nothing is to be done, or it takes something else for the region."
             return warning("camera", "endoscope", what, todo)
-        return ok("camera", "endoscope", f"sees {seen:.0%} of the region, {age_s * 1e3:.0f} ms ago")
+        what = f"sees {seen:.0%} of the region, {age_s * 1e3:.0f} ms ago in the median"
+        return ok("camera", "endoscope", what)
+
+
+def _cloud_stamp_s(look: CameraReadings) -> float | None:
+    return None if look.cloud is None else look.cloud.stamp_s
+
+
+def _age_s(bench: CheckBench, stamp_s: Callable[[CameraReadings], float | None]) -> float:
+    """Median age over all looks; infinite where there was nothing yet."""
+    ages = []
+    for look, now_s in bench.looks:
+        at_s = stamp_s(look)
+        ages.append(np.inf if at_s is None else now_s - at_s)
+    return float(np.median(ages))

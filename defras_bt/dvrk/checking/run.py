@@ -53,6 +53,7 @@ CHECKS: tuple[Check, ...] = (
 
 LISTEN_S = 4.0
 _CONNECT_S = 2.0
+_LOOK_EVERY_S = 0.05
 _P99_SHARE = 0.2
 _CLOCK_STANDS_S = 10.0
 
@@ -75,7 +76,10 @@ def check_bench(setup: Setup, scene: Scene, out: Path) -> Iterator[CheckBench]:
             # While connections are being made, topics come late and one after the other.
             sleep(_CONNECT_S)
             watches = {name: Watch(arm.name, transport) for name, arm in setup.arms.items()}
-            sleep(LISTEN_S)
+            looks = []
+            for _ in range(round(LISTEN_S / _LOOK_EVERY_S)):
+                sleep(_LOOK_EVERY_S)
+                looks.append((cameras.latest(), cameras.now_s()))
             yield CheckBench(
                 setup,
                 scene,
@@ -84,6 +88,7 @@ def check_bench(setup: Setup, scene: Scene, out: Path) -> Iterator[CheckBench]:
                 {name: arms[name] for name in setup.arms},
                 {name: watches[name] for name in setup.arms},
                 cameras,
+                looks,
                 out,
             )
         finally:
