@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 
 from defras_bt.cli.errors import ExitCode, UserError
+from defras_bt.learning.networks.no_weights import NoWeights
 from defras_sim.rest_shape import NotASlab
 from defras_sim.worlds.error import CannotImitate
 from defras_sim.yaml_source import InvalidFile
@@ -80,7 +81,7 @@ def run_commands() -> None:
         for fault in error.faults:
             console.print(str(fault), style="red", markup=False)
         sys.exit(ExitCode.INVALID)
-    except (UserError, NotASlab, CannotImitate) as error:
+    except (UserError, NoWeights, NotASlab, CannotImitate) as error:
         console.print(str(error), style="red", markup=False)
         sys.exit(ExitCode.INVALID)
     except Exception as error:

@@ -9,6 +9,7 @@ import typer
 
 from defras_bt.benchmark.files import write_benchmark
 from defras_bt.benchmark.planner import planning_times
+from defras_bt.cli.benchmark_attachments import attachments
 from defras_bt.cli.benchmark_blame import blame
 from defras_bt.cli.benchmark_diagnosis import diagnosis
 from defras_bt.cli.benchmark_executive import executive
@@ -26,6 +27,7 @@ def benchmarks() -> None:
     """Measure, and leave NAME.json, NAME.csv and NAME.html."""
 
 
+app.command("attachments")(attachments)
 app.command("blame")(blame)
 app.command("executive")(executive)
 app.command("table1")(table1)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from defras_bt.diagnosis.mismatch.finding import MismatchService
 from defras_bt.executive.blackboard import Blackboard
+from defras_bt.learning.chain.estimators import EstimatorName
 from defras_bt.learning.estimate import AttachmentEstimator, Keyframe
 from defras_bt.planning.plan import GridPoint, Plan, Situation
 from defras_sim.geometry import Pose
@@ -71,15 +72,15 @@ Rehearse = Callable[[Scene, GridPoint, Sequence[str]], Rehearsal]
 class Context:
     """Services of one executive.
 
-    ``approve`` asks the operator before a plan is carried out: None means not answered yet, ask
-    again in the next tick.
+    ``estimator`` gives an estimator of the attachments by its name. ``approve`` asks the operator
+    before a plan is carried out: None means not answered yet, ask again in the next tick.
     """
 
     board: Blackboard
     twin: TwinService
     monitor: MonitorService
     planner: PlanningService
-    estimator: AttachmentEstimator
+    estimator: Callable[[EstimatorName], AttachmentEstimator]
     mismatch: MismatchService
     keyframes: KeyframeService
     rehearse: Rehearse

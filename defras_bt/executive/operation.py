@@ -20,7 +20,7 @@ from defras_bt.executive.perception import Perception
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
 from defras_bt.faults.faults import NO_FAULTS, FaultInjection, Faults
 from defras_bt.learning.buffer import KeyframeBuffer
-from defras_bt.learning.inverse import InverseEstimator
+from defras_bt.learning.chain.estimators import estimator
 from defras_bt.monitoring.warning import WarningMonitor
 from defras_bt.planning.plan import Plan
 from defras_bt.recording.composite import CompositeRecorder
@@ -144,7 +144,7 @@ def operate_in(
             twin=twin,
             monitor=monitor,
             planner=injected.planner(believed),
-            estimator=InverseEstimator(),
+            estimator=estimator,
             mismatch=MismatchRanking(),
             keyframes=keyframes,
             rehearse=TwinRehearsal(),

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from defras_bt.learning.adoption import AdoptionRule, Hearing, distances_m
+from defras_bt.learning.adoption import AdoptionRule
 from defras_bt.learning.cost import SearchSettings
 from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
 from defras_bt.learning.hold_out import Split, split
+from defras_bt.learning.judging import Case, kept
 from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_bt.learning.search import AttachmentSearch, Mask, SearchResult
 from defras_sim.scene import Scene
-from defras_sim.tissue.state import TissueState
 
 
 @dataclass(frozen=True)
@@ -42,39 +42,17 @@ class InverseEstimator:
         ``rng`` draws the permutations of the test for chance; the same one gives the same answer.
         """
         if not keyframes:
-            return _kept(belief, "no shape was observed since the grasp")
+            return kept(belief, "no shape was observed since the grasp")
         parts = split(keyframes, self.most_fitted, self.least_travel_m)
         if not parts.fitted:
-            return _kept(belief, "the tissue has not been moved far enough to tell anything")
+            return kept(belief, "the tissue has not been moved far enough to tell anything")
         try:
             start = self._search_coarse(belief, keyframes, parts)
-            replay = Replay(belief, keyframes)
-            before = replay.repeat(belief.hole_stiffness_n_per_m(belief.attached))
-            found = self._search_fine(belief, replay, parts, start)
-            before_m = _judging_distance_m(belief, parts, before)
+            case = Case.of(belief, keyframes, parts)
+            found = self._search_fine(belief, case.replay, parts, start)
         except NotRepeatable as fault:
-            return _kept(belief, f"the observed motion cannot be repeated: {fault}")
-        if np.array_equal(found.attached, belief.attached):
-            reason = "no change of attachments explains the observed shapes better"
-            return _kept(belief, reason, found, before_m)
-        try:
-            after = replay.repeat(belief.hole_stiffness_n_per_m(found.attached))
-            hearing = Hearing(belief.depth_camera, keyframes, parts, before, after)
-            evidence = hearing.evidence(rng)
-            objection = hearing.objection(self.rule, evidence)
-        except NotRepeatable as fault:
-            return _kept(belief, f"the proposed attachments fail: {fault}", found, before_m)
-        changed = int(np.sum(found.attached != belief.attached))
-        return AttachmentEstimate(
-            attached=found.attached if objection is None else belief.attached,
-            probability=found.probability,
-            held_out_before_m=evidence.before_m,
-            held_out_after_m=evidence.after_m,
-            adopted=objection is None,
-            reason=objection
-            or f"{changed} changed holes bring points that were not fitted from "
-            f"{1e3 * evidence.before_m:.2f} to {1e3 * evidence.after_m:.2f} mm",
-        )
+            return kept(belief, f"the observed motion cannot be repeated: {fault}")
+        return case.judged(found.attached, found.probability, self.rule, rng)
 
     def _search_coarse(self, belief: Scene, keyframes: Sequence[Keyframe], parts: Split) -> Mask:
         """Most of the way, on a mesh on which a round takes a fraction of a second."""
@@ -98,16 +76,3 @@ class InverseEstimator:
     def _searcher(self, belief: Scene, replay: Replay, parts: Split) -> AttachmentSearch:
         points, frames = parts.fitted_points_m, parts.fitted
         return AttachmentSearch(belief, replay, points, frames, self.search)
-
-
-def _kept(
-    belief: Scene, reason: str, found: SearchResult | None = None, error_m: float = float("nan")
-) -> AttachmentEstimate:
-    attached: Mask = belief.attached
-    probability = found.probability if found is not None else attached.astype(float)
-    return AttachmentEstimate(attached, probability, error_m, error_m, False, reason)
-
-
-def _judging_distance_m(belief: Scene, parts: Split, shapes: Sequence[TissueState]) -> float:
-    distance, _ = distances_m(belief.depth_camera, parts.judging_points_m, shapes)
-    return float(distance.mean())

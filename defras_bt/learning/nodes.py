@@ -7,9 +7,19 @@ from typing import ClassVar
 from py_trees.common import Status
 
 from defras_bt.executive.blackboard import LearningAttempt
+from defras_bt.executive.context import Context
+from defras_bt.executive.node import NodeParameters
 from defras_bt.executive.reasons import Code, Remedy
 from defras_bt.executive.recovery import RecoveryLeaf
 from defras_bt.executive.registry import register_node
+from defras_bt.learning.chain.estimators import EstimatorName
+
+
+class LearnParameters(NodeParameters):
+    """``estimator``: who infers the attachments; ``chain`` lets a network propose, the tissue model
+    refine, and held-out points decide."""
+
+    estimator: EstimatorName = "chain"
 
 
 @register_node
@@ -17,6 +27,17 @@ class LearnAttachments(RecoveryLeaf):
     """Estimate the attachments; adopt them only if they explain what was not fitted."""
 
     remedy: ClassVar[Remedy] = Remedy.LEARN
+    Parameters = LearnParameters
+    parameters: LearnParameters
+
+    def __init__(self, name: str, context: Context, parameters: LearnParameters) -> None:
+        """
+        Raises:
+            NoWeights: the weights of the estimator's network are missing, or others than its card
+                says: better before the operation than in it.
+        """
+        super().__init__(name, context, parameters)
+        self._estimator = context.estimator(parameters.estimator)
 
     def recover(self) -> Status:
         board, context = self.context.board, self.context
@@ -29,7 +50,7 @@ class LearnAttachments(RecoveryLeaf):
             warning_state=board.warning_state or 0,
             tips_m={name: arm.tissue_from_tip.position_m for name, arm in arms.items()},
         )
-        estimate = context.estimator.estimate(context.scene, frames, context.rng)
+        estimate = self._estimator.estimate(context.scene, frames, context.rng)
         before_mm, after_mm = estimate.held_out_before_m * 1e3, estimate.held_out_after_m * 1e3
         data = {
             "adopted": estimate.adopted,

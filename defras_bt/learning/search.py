@@ -51,13 +51,16 @@ class AttachmentSearch:
         points_m: Sequence[Floats],
         frames: Sequence[int],
         settings: SearchSettings,
+        considered: Mask | None = None,
     ) -> None:
-        """``points_m`` are the fitted points (n, 3) of each of ``frames``."""
+        """``points_m`` are the fitted points (n, 3) of each of ``frames``. Only holes that are
+        ``considered`` (holes,) may change, if given: time grows with their number."""
         self._belief = belief
         self._replay = replay
         self._cells = [ObservedCells.of(points) for points in points_m]
         self._frames = tuple(frames)
         self._settings = settings
+        self._considered = belief.is_hole if considered is None else considered
         self._believed = belief.attached
         self._grid = np.arange(len(self._believed)).reshape(belief.hole_counts[::-1])
         self._cost = Cost(self._believed, self._grid.shape, settings)
@@ -160,7 +163,7 @@ class AttachmentSearch:
         near = np.zeros(shape, bool)
         for row, column in np.argwhere(loaded.reshape(shape)):
             near[max(0, row - 2) : row + 3, max(0, column - 2) : column + 3] = True
-        return free | (attached & near.ravel())
+        return (free | (attached & near.ravel())) & self._considered
 
     def _change(self, here: Mask, blocks: Indices, sets: Mask) -> Floats:
         """Stiffness (b, q) that each hole of each block gains."""

@@ -1,11 +1,16 @@
 """LearnAttachments believes a new set of holes only where unseen points bear it out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from py_trees.common import Status
 
 from defras_bt.executive.testing import flat_cloud_m
+from defras_bt.executive.tree_file import read_tree
+from defras_bt.learning.networks.no_weights import NoWeights
 from defras_bt.learning.nodes import LearnAttachments
+from defras_sim.resources import resource
 from defras_sim.worlds.protocol import PointCloud
 
 
@@ -82,3 +87,36 @@ def test_without_a_shape_nothing_is_tried(bench):
 def test_it_never_commands(bench, learn):
     bench.tick(learn)
     assert bench.board.command.arms == {}
+
+
+def test_the_estimator_is_asked_for_by_name(bench):
+    asked = []
+    context = replace(bench.context, estimator=lambda name: asked.append(name) or bench.estimator)
+    for parameters in ({}, {"estimator": "banet"}):
+        LearnAttachments("learn", context, LearnAttachments.Parameters.model_validate(parameters))
+    assert asked == ["chain", "banet"]
+
+
+@pytest.mark.parametrize(("tree", "wanted"), [("defras", {"chain"}), ("defras_paper", {"banet"})])
+def test_each_tree_learns_with_its_estimator(tree, wanted):
+    spec = read_tree(resource(f"trees/{tree}.yaml")).root
+    leaves = [spec]
+    found = set()
+    while leaves:
+        here = leaves.pop()
+        leaves += here.children
+        if here.node_class is LearnAttachments:
+            found.add(here.options.estimator)
+    assert found == wanted
+
+
+def test_missing_weights_are_said_before_the_operation(bench):
+    def nothing(name):
+        raise NoWeights(f"the weights of {name} are not here")
+
+    with pytest.raises(NoWeights, match="chain"):
+        LearnAttachments(
+            "learn",
+            replace(bench.context, estimator=nothing),
+            LearnAttachments.Parameters(),
+        )

@@ -71,7 +71,7 @@ class NodeBench:
             twin=self.twin,
             monitor=self.monitor,
             planner=self.planner,
-            estimator=self.estimator,
+            estimator=lambda name: self.estimator,
             mismatch=self.mismatch,
             keyframes=self.keyframes,
             rehearse=self.rehearse,

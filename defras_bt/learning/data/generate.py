@@ -45,7 +45,7 @@ def generate(
     """
     shards = out / "shards"
     shards.mkdir(parents=True, exist_ok=True)
-    _open_manifest(out, request)
+    open_manifest(out, request)
     anatomies = anatomy_scenes(out / "anatomies", tell)
     missing = missing_shards(out, request)
     work = (delayed(_make_shard)(shards, anatomies, request.seed, number) for number in missing)
@@ -84,7 +84,12 @@ def _make_shard(folder: Path, anatomies: list[Scene], seed: int, number: int) ->
     return number
 
 
-def _open_manifest(out: Path, request: Request) -> None:
+def open_manifest(out: Path, request: Request) -> None:
+    """Note in the folder what was asked for.
+
+    Raises:
+        InvalidData: the folder holds data of another seed or format.
+    """
     file = out / "manifest.json"
     if file.exists():
         known = json.loads(file.read_text(encoding="utf-8"))

@@ -17,6 +17,7 @@ from safetensors.torch import load, save
 from torch import Tensor, nn
 
 from defras_bt.learning.networks.banet import VoxelNetwork
+from defras_bt.learning.networks.no_weights import NoWeights
 from defras_bt.learning.networks.sequence import SequenceNetwork
 
 NetworkName = Literal["banet", "sequence"]
@@ -26,10 +27,6 @@ SHIPPED = Path(__file__).parent.parent / "weights"
 """The weights that come with the project."""
 
 FORMAT = "defras attachment network 1"
-
-
-class NoWeights(RuntimeError):
-    """There are no weights of a network, or they are not what their card says."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,85 @@
+"""Propose, refine, verify: networks say where to look, the tissue model what is so, and points that
+neither was fitted to whether to believe it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from defras_bt.learning.adoption import AdoptionRule
+from defras_bt.learning.chain.candidates import candidate_sets, open_questions
+from defras_bt.learning.cost import SearchSettings
+from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
+from defras_bt.learning.hold_out import split
+from defras_bt.learning.judging import Case, kept
+from defras_bt.learning.networks.propose import Proposal, Proposer
+from defras_bt.learning.prediction import Predicted
+from defras_bt.learning.replay import NotRepeatable
+from defras_bt.learning.search import AttachmentSearch, SearchResult
+from defras_sim.scene import Scene
+
+
+@dataclass(frozen=True)
+class ChainEstimator:
+    """Networks propose, the inverse estimate goes on from the best proposal, and the result is
+    believed only if it beats the belief on what it was not fitted to.
+
+    ``proposers`` are asked in turn. ``sure``: a hole is changed in a proposal where its network
+    says with such a probability that it is otherwise than believed. The search changes at most
+    ``most_holes`` holes, of those to which a network gives a chance of ``least_doubt`` or more.
+    """
+
+    proposers: tuple[Proposer, ...]
+    search: SearchSettings = field(default_factory=SearchSettings)
+    rule: AdoptionRule = field(default_factory=AdoptionRule)
+    sure: tuple[float, ...] = (0.5, 0.75)
+    least_doubt: float = 0.02
+    most_holes: int = 48
+    rounds: int = 3
+    most_fitted: int = 3
+    least_travel_m: float = 0.003
+
+    def estimate(
+        self, belief: Scene, keyframes: Sequence[Keyframe], rng: np.random.Generator
+    ) -> AttachmentEstimate:
+        """See :class:`defras_bt.learning.estimate.AttachmentEstimator`."""
+        if not keyframes:
+            return kept(belief, "no shape was observed since the grasp")
+        parts = split(keyframes, self.most_fitted, self.least_travel_m)
+        if not parts.fitted:
+            return kept(belief, "the tissue has not been moved far enough to tell anything")
+        try:
+            case = Case.of(belief, keyframes, parts)
+            proposals = self._proposals(case)
+            found = self._refined(case, proposals)
+        except NotRepeatable as fault:
+            return kept(belief, f"the observed motion cannot be repeated: {fault}")
+        probability = proposals[0].probability if proposals else found.probability
+        return case.judged(found.attached, probability, self.rule, rng)
+
+    def _proposals(self, case: Case) -> list[Proposal]:
+        predicted = Predicted.of(case.replay.rest_surface, case.before)
+        asked = [each.propose(case.belief, case.keyframes, predicted) for each in self.proposers]
+        return [proposal for proposal in asked if proposal is not None]
+
+    def _refined(self, case: Case, proposals: Sequence[Proposal]) -> SearchResult:
+        """The inverse estimate from the set that explains the fitted points best."""
+        belief = case.belief
+        sets = candidate_sets(belief, proposals, self.sure)
+        asked = open_questions(belief, proposals, sets, self.most_holes, self.least_doubt)
+        searcher = AttachmentSearch(
+            belief,
+            case.replay,
+            case.parts.fitted_points_m,
+            case.parts.fitted,
+            self.search,
+            considered=asked if proposals else None,
+        )
+        best, lowest = belief.attached, searcher.cost(belief.attached)
+        for each in sets:
+            cost = searcher.cost(each)
+            if cost < lowest:
+                best, lowest = each, cost
+        return searcher.run(best, self.rounds)

@@ -1,0 +1,33 @@
+"""All estimators of the attachments by name."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Literal
+
+from defras_bt.learning.estimate import AttachmentEstimator
+from defras_bt.learning.inverse import InverseEstimator
+
+EstimatorName = Literal["inverse", "banet", "sequence", "chain"]
+ESTIMATORS: tuple[EstimatorName, ...] = ("inverse", "banet", "sequence", "chain")
+
+
+@cache
+def estimator(name: EstimatorName) -> AttachmentEstimator:
+    """The estimator called ``name``, with the shipped weights if it needs any.
+
+    torch is loaded only where a network is asked for.
+
+    Raises:
+        NoWeights: the weights of a network are missing, or not what their card says.
+    """
+    if name == "inverse":
+        return InverseEstimator()
+    from defras_bt.learning.chain.chain import ChainEstimator
+    from defras_bt.learning.networks.estimator import NetworkEstimator
+    from defras_bt.learning.networks.propose import proposer
+    from defras_bt.learning.networks.weights import read_weights
+
+    if name == "chain":
+        return ChainEstimator((proposer(read_weights("sequence")),))
+    return NetworkEstimator(proposer(read_weights(name)))
