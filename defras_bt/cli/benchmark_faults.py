@@ -26,6 +26,8 @@ _NOTES = (
     "caught; an end without a reason.",
 )
 
+_WIDTH = 190
+
 
 def faults(
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/benchmark"),
@@ -62,10 +64,11 @@ def faults(
     summary = by_kind(runs)
     tables = {"By kind of fault": summary, "By run": by_run(runs)}
     write_benchmark(out, "faults", f"Fault campaign, tree {tree}", tables, _NOTES)
-    table = Table(*summary[0])
+    table = Table(*summary[0], box=None)
     for line in summary:
         table.add_row(*map(str, line.values()))
-    Console().print(table)
+    # In a file or a narrow window, a row of numbers should not be broken.
+    Console(width=max(Console().width, _WIDTH)).print(table)
     typer.echo(f"Written to {out}: faults.json, faults.csv, faults.html")
     if not passed(runs):
         raise typer.Exit(ExitCode.NOT_REACHED)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from defras_bt.monitoring.cells import ROUNDING, cube_at, inside, reach
 from defras_bt.monitoring.triangle_cells import TriangleCells, triangle_cells
 from defras_bt.monitoring.triangles import Point, bound, planes_of, square_to, weights_of
+from defras_bt.sensing.usable import all_finite
 from defras_sim.geometry import Floats
 from defras_sim.tissue.matrices import jit
 
@@ -62,7 +63,7 @@ def checked(points_m: Floats, corners_m: Floats) -> tuple[Floats, Floats]:
     corners = np.ascontiguousarray(corners_m, float).reshape(-1, 3, 3)
     if len(corners) == 0:
         raise ValueError("no triangles given: nothing is closest to a point")
-    if not (np.isfinite(points).all() and np.isfinite(corners).all()):
+    if not (all_finite(points) and all_finite(corners.reshape(-1, 3))):
         raise ValueError("points and triangles should be finite; drop NaN points while sensing")
     return points, corners
 
