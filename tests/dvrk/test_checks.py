@@ -234,9 +234,13 @@ def test_other_units(lab: Lab, topic: str, factor: float, says: str) -> None:
 
 
 def test_a_slow_driver(lab: Lab) -> None:
-    found = worst(lab.find(RateCheck(), period_s=0.02))
-    assert "measured_cp comes at 50 Hz" in found.what
-    assert "100 Hz" in found.todo
+    found = worst(lab.find(RateCheck(), period_s=0.025))
+    assert "measured_cp comes at 40 Hz" in found.what
+    assert "50 Hz needed" in found.todo
+
+
+def test_a_driver_that_is_slow_but_fast_enough(lab: Lab) -> None:
+    assert {one.grade for one in lab.find(RateCheck(), period_s=0.015)} == {"warning"}
 
 
 @pytest.mark.parametrize(

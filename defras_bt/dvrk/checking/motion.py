@@ -75,7 +75,9 @@ class MotionCheck:
         findings: list[Finding] = []
         for arm, name in self._names.items():
             try:
-                findings += [*self._axes(arm, name), self._jaw(arm, name)]
+                findings += self._axes(arm, name)
+                if not any(one.grade == "wrong" for one in findings):
+                    findings.append(self._jaw(arm, name))
             except Stopped as stopped:
                 todo = "Clear the reason, and check again."
                 findings.append(wrong("motion", name, str(stopped), todo))
