@@ -60,7 +60,7 @@ class RosRecorder:
 
     def tick(self, record: TickRecord) -> None:
         cloud = record.observation.cloud
-        if cloud is not None and cloud is not self._cloud:
+        if cloud is not None and (self._cloud is None or cloud.stamp_s != self._cloud.stamp_s):
             self._cloud = cloud
             self._clouds += 1
             self._out[CLOUD_TOPIC].publish(self._cloud_message(cloud))

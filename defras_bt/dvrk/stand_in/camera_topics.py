@@ -14,6 +14,7 @@ from defras_bt.dvrk.stand_in.faults import CameraFault
 from defras_bt.dvrk.stand_in.menu import Menu
 from defras_bt.dvrk.stand_in.patient import Pictures
 from defras_bt.dvrk.stand_in.ros_messages import RosMessages
+from defras_bt.dvrk.stand_in.witness import Witness
 from defras_sim.geometry import Floats
 from defras_sim.worlds.protocol import CameraImage
 
@@ -33,10 +34,11 @@ _QUEUE = 2
 class CameraTopics:
     """Publishes pictures: an organised coloured cloud, depth and colour images with their info."""
 
-    def __init__(self, rospy: Any, delivery: Delivery, menu: Menu) -> None:
+    def __init__(self, rospy: Any, delivery: Delivery, menu: Menu, witness: Witness) -> None:
         sensor = ros_module("sensor_msgs.msg")
         self._messages, self._delivery, self._menu = RosMessages(), delivery, menu
         self._frozen: CameraImage | None = None
+        self._witness = witness
         self._out = {
             topic: rospy.Publisher(topic, kind, queue_size=_QUEUE, tcp_nodelay=True)
             for topic, kind in (
@@ -76,6 +78,7 @@ class CameraTopics:
         if depth_m is None:
             raise ValueError("the depth camera's picture has no depth")
         kinds = {fault.fault for fault in self._menu.there(CameraFault)}
+        self._witness.tell("picture", now_s, stamp_s=image.stamp_s, faults=sorted(kinds))
         frame = "map" if "wrong_frame" in kinds else DEPTH_FRAME
         depth = 1e3 * depth_m if "millimetres" in kinds else depth_m
         make, stamp_s = self._messages, start_s + image.stamp_s

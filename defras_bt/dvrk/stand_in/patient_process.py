@@ -23,6 +23,7 @@ from defras_bt.dvrk.stand_in.menu import Menu
 from defras_bt.dvrk.stand_in.order import WORLD_TICK_S, StandInOrder
 from defras_bt.dvrk.stand_in.patient import ArmFeedback, Patient, TipTarget, patient_scene
 from defras_bt.dvrk.stand_in.ros_node import join
+from defras_bt.dvrk.stand_in.witness import Witness, cameras_witness
 from defras_bt.executive.operation import make_world
 from defras_sim.geometry import Pose
 from defras_sim.worlds.error import WorldError
@@ -149,7 +150,8 @@ def _live(order: PatientOrder, line: Connection) -> None:
         delay_s = whole.imperfections.transport_delay_s
         delays: dict[Source, float] = {"cloud": delay_s, "endoscope": delay_s}
         delivery = Delivery(menu, delivery_rng, start_s, delays)
-        cameras = CameraTopics(rospy, delivery, menu)
+        witness = Witness(cameras_witness(whole.witness))
+        cameras = CameraTopics(rospy, delivery, menu, witness)
         take_orders(rospy, menu, lambda: patient.time_s, lambda _: None)
         while True:
             menu.turns(patient.time_s)

@@ -2,7 +2,8 @@
 
 One JSON object per line. ``event`` is "fault" (one begins or ends), "goal" (a command came in,
 ``way_m``: how far it is from the last one of its kind, ``refused`` where it was), "arm" (an arm's
-true state, every 20 ms), "clock" (ROS time of world time 0).
+true state, every 20 ms), "clock" (ROS time of world time 0). The cameras have a file of their own,
+with "picture": one left, ``faults`` being there.
 """
 
 from __future__ import annotations
@@ -36,3 +37,12 @@ class Witness:
     def close(self) -> None:
         if self._file is not None:
             self._file.close()
+
+
+def cameras_witness(file: Path | None) -> Path | None:
+    """The cameras' file beside that of the arms.
+
+    >>> cameras_witness(Path("run/witness.jsonl"))
+    PosixPath('run/witness.cameras.jsonl')
+    """
+    return None if file is None else file.with_name(f"{file.stem}.cameras{file.suffix}")
