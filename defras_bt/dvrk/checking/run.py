@@ -56,6 +56,7 @@ _CONNECT_S = 2.0
 _LOOK_EVERY_S = 0.05
 _P99_SHARE = 0.2
 _CLOCK_STANDS_S = 10.0
+_HEARD_S = 15.0
 
 
 @contextmanager
@@ -116,7 +117,7 @@ def run_motion(bench: CheckBench, tell: Callable[[Finding], None]) -> list[Findi
     setup = bench.setup
     servo = ServoProcess(setup)
     try:
-        sleep(_CONNECT_S)
+        _wait_until_heard(servo)
         frames = {
             name: ArmFrames.of(arm, bench.registration.arms[name].pose)
             for name, arm in setup.arms.items()
@@ -134,6 +135,13 @@ def run_motion(bench: CheckBench, tell: Callable[[Finding], None]) -> list[Findi
     for finding in findings:
         tell(finding)
     return findings
+
+
+def _wait_until_heard(servo: ServoProcess) -> None:
+    """Topics connect one after the other; what is still missing in the end, the motion check says."""
+    until_s = monotonic() + _HEARD_S
+    while any(arm.stopped for arm in servo.snapshot().arms.values()) and monotonic() < until_s:
+        sleep(_LOOK_EVERY_S)
 
 
 def _pause(servo: ServoProcess, time_s: float) -> None:
