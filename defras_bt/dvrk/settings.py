@@ -94,7 +94,7 @@ class Stream(Part):
 
     rate_hz: Annotated[float, Field(ge=100, le=1000)] = 100.0
     speed_m_s: Annotated[float, Field(gt=0, le=0.2)] = 0.06
-    acceleration_m_s2: Annotated[float, Field(gt=0, le=5)] = 0.5
+    acceleration_m_s2: Annotated[float, Field(gt=0, le=5)] = 1.0
     braking_m_s2: Annotated[float, Field(ge=0.2, le=50)] = 5.0
     turning_rad_s: Annotated[float, Field(gt=0, le=6)] = 1.0
     turning_rad_s2: Annotated[float, Field(gt=0, le=60)] = 10.0

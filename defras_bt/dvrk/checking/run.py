@@ -138,7 +138,7 @@ def run_motion(bench: CheckBench, tell: Callable[[Finding], None]) -> list[Findi
 
 
 def _wait_until_heard(servo: ServoProcess) -> None:
-    """Topics connect one after the other; what is still missing in the end, the motion check says."""
+    """Topics connect one after the other; what is missing in the end, the motion check says."""
     until_s = monotonic() + _HEARD_S
     while any(arm.stopped for arm in servo.snapshot().arms.values()) and monotonic() < until_s:
         sleep(_LOOK_EVERY_S)
