@@ -140,7 +140,7 @@ def _run(
     plan = None
     if needs_plan(read_tree(tree_file)):
         samples = SAMPLES if run == ROBUST else 0
-        plan = _plan(_in_world(believed, world), preparations, samples, seed).plan
+        plan = plan_for(_in_world(believed, world), preparations, samples, seed).plan
     operation = Operation(
         scene=believed,
         actual=actual,
@@ -160,7 +160,9 @@ def _run(
     return {**values, **force.values()}
 
 
-def _plan(scene: Scene, preparations: Preparations, samples: int, seed: int) -> PreoperativeResult:
+def plan_for(
+    scene: Scene, preparations: Preparations, samples: int, seed: int
+) -> PreoperativeResult:
     """The plan made before the operation; rehearsed now, if nobody did yet."""
     known = preparations.plans.get(scene_hash(scene))
     if known is not None and not samples:

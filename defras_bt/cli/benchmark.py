@@ -12,6 +12,7 @@ from defras_bt.benchmark.planner import planning_times
 from defras_bt.cli.benchmark_attachments import attachments
 from defras_bt.cli.benchmark_blame import blame
 from defras_bt.cli.benchmark_diagnosis import diagnosis
+from defras_bt.cli.benchmark_dvrk_faults import dvrk_faults
 from defras_bt.cli.benchmark_executive import executive
 from defras_bt.cli.benchmark_faults import faults
 from defras_bt.cli.benchmark_monitor import monitor
@@ -33,6 +34,7 @@ app.command("executive")(executive)
 app.command("table1")(table1)
 app.command("table2")(table2)
 app.command("diagnosis")(diagnosis)
+app.command("dvrk-faults")(dvrk_faults)
 app.command("faults")(faults)
 app.command("monitor")(monitor)
 app.command("tissue")(tissue)

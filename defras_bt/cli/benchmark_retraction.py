@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 from rich.console import Console
@@ -12,13 +12,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from defras_bt.benchmark.cases import Case, generated_cases, table1_cases, table2_cases
+from defras_bt.benchmark.dvrk_retraction import DvrkSetting, dvrk_rows
 from defras_bt.benchmark.files import write_benchmark
-from defras_bt.benchmark.retraction import ALL_RUNS, RUNS, Row, prepared, run_cases
+from defras_bt.benchmark.retraction import ALL_RUNS, RUNS, TREES, Row, prepared, run_cases
 from defras_bt.benchmark.retraction_summary import by_case, spread, success
 from defras_bt.benchmark.row_store import OtherBenchmark, RowStore
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
-from defras_bt.executive.operation import WORLDS
+from defras_bt.dvrk.ros_packages import RosMissing, ros_module
+from defras_bt.dvrk.stand_in.order import WorldName
+from defras_bt.executive.operation import ROBOT_WORLD, WORLDS
 from defras_bt.planning.journal import InvalidJournal, Journal
 
 FIRST_UNSEEN_SEED = 10_000
@@ -61,18 +64,78 @@ def table1(
 
 def table2(
     out: Out = Path("out/benchmark"),
-    world: World = "model",
-    trees: Runs = USUAL_RUNS,
+    world: Annotated[str, typer.Option(help="model, bullet or dvrk (over ROS).")] = "model",
+    trees: Annotated[
+        str | None, typer.Option(help=f"Separated by commas: {', '.join(ALL_RUNS)}.")
+    ] = None,
     seed: Seed = 0,
     jobs: Jobs = 2,
     resume: Resume = False,
+    patient: Annotated[
+        str, typer.Option(help="World behind the dVRK's stand-in: bullet or model.")
+    ] = "bullet",
+    imperfections: Annotated[
+        str, typer.Option(help="Of the stand-in's arms and cameras: lab, none, or a file.")
+    ] = "lab",
 ) -> None:
     """The set-ups A, B and C with fewer, more and as many attachments believed.
 
+    With --world dvrk each run has a roscore and a stand-in of its own, with the imperfections of
+    real arms; the belief knows what the arms' joints do, as a laboratory does that has calibrated
+    them, and nothing of the errors of registration.
+
     Example: defras benchmark table2 --world model --out out/benchmark
     """
+    if world == ROBOT_WORLD:
+        setting = _setting(patient, imperfections)
+        _measure_dvrk(out, setting, trees or TREES[0], seed, jobs, resume)
+        return
     title = f"Fewer, more and as many attachments believed ({world} world)"
-    _measure("table2", title, table2_cases(), out, world, trees, seed, jobs, resume)
+    runs = trees or USUAL_RUNS
+    _measure("table2", title, table2_cases(), out, world, runs, seed, jobs, resume)
+
+
+def _setting(patient: str, imperfections: str) -> DvrkSetting:
+    if patient not in get_args(WorldName):
+        raise UserError(f"--patient {patient}: valid are {', '.join(get_args(WorldName))}")
+    if imperfections not in ("lab", "none") and not Path(imperfections).is_file():
+        raise UserError(f"--imperfections {imperfections}: valid are lab, none, or a file")
+    return DvrkSetting("bullet" if patient == "bullet" else "model", imperfections)
+
+
+def _measure_dvrk(
+    out: Path, setting: DvrkSetting, trees: str, seed: int, jobs: int, resume: bool
+) -> None:
+    runs = trees.split(",")
+    if unknown := [run for run in runs if run not in TREES]:
+        raise UserError(f"--trees {','.join(unknown)}: with --world dvrk {', '.join(TREES)}")
+    try:
+        ros_module("rospy")
+    except RosMissing as error:
+        raise UserError(str(error)) from error
+    folder_for(out)
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    name, told = "table2_dvrk", f"{setting.patient} patient, imperfections {setting.imperfections}"
+    try:
+        rows = RowStore(out / f"{name}.rows.jsonl", f"{name}, {told}, seed {seed}", resume=resume)
+        journal = Journal(out / "rehearsals.journal")
+    except (OtherBenchmark, InvalidJournal) as error:
+        raise UserError(str(error)) from error
+    console.print("Rehearsing the 17 configurations for the force threshold", markup=False)
+    preparations = prepared(setting.patient, jobs=jobs, journal=journal)
+    cases = table2_cases()
+    for row in dvrk_rows(cases, runs, setting, preparations, seed=seed, done=rows.done):
+        rows.add(row)
+        console.print(_told(row), markup=False)
+    notes = [
+        f"World: dvrk, over a ROS 1 master, {told}. Seed: {seed}. Simulated clock. Force "
+        f"threshold: {2 * preparations.force_median_n:.3f} N.",
+        "F max true is that of the stand-in's patient, which the executive never sees.",
+    ]
+    title = f"Fewer, more and as many attachments believed (dVRK's stand-in, {told})"
+    wanted = {f"{case.name} {case.relation} {run}" for case in cases for run in runs}
+    _write(out, name, title, [row for row in rows.rows if row.key in wanted], notes)
+    rows.discard()
 
 
 def _measure(
@@ -129,10 +192,14 @@ def _measure(
         "F max true is the world's own force, which the executive never sees. The oracle runs the "
         "tree defras with the actual attachments as its belief.",
     ]
+    _write(out, name, title, asked, notes)
+    rows.discard()
+
+
+def _write(out: Path, name: str, title: str, asked: Sequence[Row], notes: Sequence[str]) -> None:
     summary = success(asked)
     tables = {"Goal reached": summary, "Spread": spread(asked), "By case": by_case(asked)}
     write_benchmark(out, name, title, tables, notes)
-    rows.discard()
     shown = Table(*summary[0])
     for line in summary:
         shown.add_row(*map(str, line.values()))
