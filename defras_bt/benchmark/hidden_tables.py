@@ -30,18 +30,12 @@ def arm_table(file: Path, hidden: Extension, rng: np.random.Generator, rows: int
 
     How much the sensors scatter is told: errors that remember look like a cause otherwise.
     """
-    time_s: Floats = 0.1 * np.arange(rows, dtype=float)
-    rates, phases = rng.uniform(0.3, 2.0, (4, 6)), rng.uniform(0, 2 * np.pi, (4, 6))
-    waves = np.sin(rates * time_s[:, None, None] + phases).sum(axis=1) / 2
-    setpoint = waves * [0.4, 0.3, 0.03, 0.7, 0.6, 0.6] + [0, 0, 0.15, 0, 0, 0]
-    measured = true_joints(hidden, time_s, setpoint) + JOINT_NOISE * _remembering(rng, rows, 6)
-    columns = {"time_s": time_s}
-    for what, joints in (("setpoint", setpoint), ("measured", measured)):
-        for i, unit in enumerate(UNITS):
-            columns[f"q{i + 1}_{what}_{unit}"] = joints[:, i]
+    time_s, setpoint = random_joints(rng, rows)
+    measured = true_joints(hidden, time_s, setpoint) + JOINT_NOISE * remembering(rng, rows, 6)
+    columns = joint_columns(time_s, setpoint, measured)
     for i, unit in enumerate(UNITS):
         columns[f"q{i + 1}_measured_sd_{unit}"] = np.full(rows, JOINT_NOISE[i])
-    _write(file, columns)
+    write_table(file, columns)
 
 
 def coupon_table(file: Path, hidden: Extension, rng: np.random.Generator) -> None:
@@ -50,23 +44,52 @@ def coupon_table(file: Path, hidden: Extension, rng: np.random.Generator) -> Non
     up, hold = np.linspace(1.0, peak, 120), np.full(100, peak)
     down, again = np.linspace(peak, 1.02, 120), np.linspace(1.02, peak + 0.1, 140)
     stretch: Floats = np.concatenate([up, hold, down, again, again[::-1]])
+    write_table(file, pull_columns(hidden, rng, stretch, _FORCE_NOISE_N, MEMORY))
+
+
+def random_joints(rng: np.random.Generator, rows: int) -> tuple[Floats, Floats]:
+    """Times and smooth set-points (rows, 6) with reversals of all sizes."""
+    time_s: Floats = 0.1 * np.arange(rows, dtype=float)
+    rates, phases = rng.uniform(0.3, 2.0, (4, 6)), rng.uniform(0, 2 * np.pi, (4, 6))
+    waves = np.sin(rates * time_s[:, None, None] + phases).sum(axis=1) / 2
+    return time_s, waves * [0.4, 0.3, 0.03, 0.7, 0.6, 0.6] + [0, 0, 0.15, 0, 0, 0]
+
+
+def joint_columns(time_s: Floats, setpoint: Floats, measured: Floats) -> dict[str, Floats]:
+    """Columns of a table of joints (rows, 6)."""
+    columns = {"time_s": time_s}
+    for what, joints in (("setpoint", setpoint), ("measured", measured)):
+        for i, unit in enumerate(UNITS):
+            columns[f"q{i + 1}_{what}_{unit}"] = joints[:, i]
+    return columns
+
+
+def pull_columns(
+    hidden: Extension, rng: np.random.Generator, stretch: Floats, noise_n: float, memory: float
+) -> dict[str, Floats]:
+    """Columns of a specimen of 20 kPa and 20 mm2 with stretch (rows,), a row each quarter second;
+    its force is seen with noise of ``noise_n`` that remembers."""
     time_s: Floats = 0.25 * np.arange(len(stretch), dtype=float)
     force_n = _AREA_M2 * nominal_stress_pa(hidden, _MODULUS_PA, time_s, stretch)
-    force_n = force_n + _FORCE_NOISE_N * _remembering(rng, len(stretch), 1)[:, 0]
+    force_n = force_n + noise_n * remembering(rng, len(stretch), 1, memory)[:, 0]
     area_m2 = np.full(len(stretch), _AREA_M2)
-    _write(file, {"time_s": time_s, "stretch": stretch, "force_N": force_n, "area_m2": area_m2})
+    return {"time_s": time_s, "stretch": stretch, "force_N": force_n, "area_m2": area_m2}
 
 
-def _remembering(rng: np.random.Generator, rows: int, columns: int) -> Floats:
+def remembering(
+    rng: np.random.Generator, rows: int, columns: int, memory: float = MEMORY
+) -> Floats:
     """Autocorrelated noise (rows, columns) of standard deviation 1."""
     noise = rng.normal(size=(rows, columns))
     for row in range(1, rows):
-        noise[row] = MEMORY * noise[row - 1] + np.sqrt(1 - MEMORY**2) * noise[row]
+        noise[row] = memory * noise[row - 1] + np.sqrt(1 - memory**2) * noise[row]
     return noise
 
 
-def _write(file: Path, columns: Mapping[str, Floats]) -> None:
+def write_table(file: Path, columns: Mapping[str, Floats]) -> Path:
+    """Leave ``columns`` of one length in ``file``."""
     with file.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(columns)
         writer.writerows(zip(*columns.values(), strict=True))
+    return file

@@ -30,15 +30,18 @@ def autoregression(partial: Floats) -> Floats:
     return ar
 
 
-def is_stationary(ar: Floats) -> bool:
-    """Whether the process stays where it is."""
-    return bool(np.all(np.abs(partial_autocorrelations(ar)) < 1.0))
+def stationary_variance(ar: Floats, innovation_sd: float) -> float:
+    """Variance of the process; infinite where it does not stay where it is."""
+    partial = partial_autocorrelations(ar)
+    if np.any(np.abs(partial) >= 1.0):
+        return float(np.inf)
+    return float(innovation_sd**2 / np.prod(1.0 - partial**2))
 
 
 def stationary_covariance(ar: Floats, innovation_sd: float) -> Floats:
     """Covariance (p, p) of p successive values of a stationary process."""
     partial = partial_autocorrelations(ar)
-    left = innovation_sd**2 / float(np.prod(1.0 - partial**2))
+    left = stationary_variance(ar, innovation_sd)
     covariance = [left]
     lower = np.zeros(0)
     for last in partial[:-1]:

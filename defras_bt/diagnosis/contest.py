@@ -20,6 +20,8 @@ from defras_bt.diagnosis.search import Search
 
 _CLEARLY = 2.0
 """Of the threshold, for causes that are accepted together."""
+_ALONE = 0.8
+"""Of what causes explain together."""
 _WIDTH = 0.25
 """Of a parameter's step, to both sides, over which a derivative is measured."""
 
@@ -71,12 +73,15 @@ def _promising_together(
 ) -> list[Addition]:
     """Of the causes that the noise was estimated beside, those that the linearised model needs,
     beside the others: without each of them held-out loss is larger by more than ``limit``, and what
-    it changes is of practical size."""
+    it changes is of practical size. None where one of them alone explains nearly all: what it
+    leaves is seen once it is fitted."""
     chosen: list[_Chosen] = []
     for (key, _), (option, own) in zip(beside.removed, beside.columns_of(now), strict=True):
         candidate = search.sketch.candidate(key)
         if not any(conflicts(candidate, search.sketch.candidate(other)) for other, *_ in chosen):
             chosen.append((key, option, own))
+    if not chosen:
+        return []
     while len(chosen) > 1:
         index, whole = _fitted(now, found, chosen)
         gains = []
@@ -88,6 +93,10 @@ def _promising_together(
             break
         del chosen[int(np.argmin(gains))]
     index, whole = _fitted(now, found, chosen)
+    nothing = float(_fitted(now, found, ())[1].total[0])
+    alone = min(float(_fitted(now, found, [one])[1].total[0]) for one in chosen)
+    if nothing - alone > _ALONE * (nothing - float(whole.total[0])):
+        return []
     amplitudes = whole.amplitudes[:, 0]
     return [
         Addition(search.sketch.candidate(key), option, amplitudes[np.searchsorted(index, own)])

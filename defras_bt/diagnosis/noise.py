@@ -14,7 +14,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from defras_bt.diagnosis.autoregression import is_stationary, stationary_covariance
+from defras_bt.diagnosis.autoregression import stationary_variance
 from defras_bt.diagnosis.layout import Layout, Series
 from defras_bt.diagnosis.problem import Channel, Samples
 from defras_bt.diagnosis.whitening import innovations
@@ -28,6 +28,8 @@ _LARGEST = 4.0
 """Robust standard deviations beyond which a residual is an outlier."""
 _WILDEST = 2.0
 """Variance that an autoregression may imply, of the one that was seen."""
+_FINELY = 0.002
+"""How well the share is found to which the roots of an autoregression have to be pulled in."""
 
 
 @dataclass(frozen=True)
@@ -182,6 +184,15 @@ def _stable(ar: Floats, innovation_sd: float, sd: float) -> ChannelNoise:
     """Pull roots inwards until the process is stationary and not wilder than what was seen."""
     if not len(ar):
         return ChannelNoise(sd, ar, innovation_sd * sd)
-    while not is_stationary(ar) or stationary_covariance(ar, innovation_sd)[0, 0] > _WILDEST:
-        ar = ar * 0.998 ** np.arange(1, len(ar) + 1)
+    lags = np.arange(1, len(ar) + 1)
+    wild, tame = 1.0, 0.0
+    if stationary_variance(ar, innovation_sd) <= _WILDEST:
+        tame = wild
+    while wild - tame > _FINELY:
+        middle = 0.5 * (wild + tame)
+        if stationary_variance(ar * middle**lags, innovation_sd) <= _WILDEST:
+            tame = middle
+        else:
+            wild = middle
+    ar = ar * tame**lags
     return ChannelNoise(sd, ar, innovation_sd * sd)

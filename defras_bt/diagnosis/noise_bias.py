@@ -17,7 +17,7 @@ import numpy as np
 from defras_bt.diagnosis.autoregression import (
     autoregression,
     partial_autocorrelations,
-    stationary_covariance,
+    stationary_variance,
 )
 from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise import ChannelNoise, Noise, estimate_noise
@@ -77,5 +77,5 @@ def _channel(numbers: Floats) -> ChannelNoise:
     ar, innovation_sd = autoregression(partial), float(np.exp(numbers[-1]))
     sd = innovation_sd
     if len(ar):
-        sd = float(np.sqrt(stationary_covariance(ar, innovation_sd)[0, 0]))
+        sd = float(np.sqrt(stationary_variance(ar, innovation_sd)))
     return ChannelNoise(sd, ar, innovation_sd)

@@ -8,9 +8,9 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from defras_bt.diagnosis.autoregression import (
     autoregression,
-    is_stationary,
     partial_autocorrelations,
     stationary_covariance,
+    stationary_variance,
 )
 
 
@@ -30,7 +30,7 @@ def test_covariance_solves_lyapunov_s_equation(order: int) -> None:
     assert np.allclose(stationary_covariance(ar, 0.3), solve_discrete_lyapunov(step, driving))
 
 
-def test_a_random_walk_is_not_stationary() -> None:
-    assert is_stationary(np.array([0.99]))
-    assert not is_stationary(np.array([1.0]))
-    assert not is_stationary(np.array([1.2, -0.1]))
+def test_a_random_walk_goes_anywhere() -> None:
+    assert stationary_variance(np.array([0.99]), 1.0) == pytest.approx(1.0 / (1.0 - 0.99**2))
+    assert stationary_variance(np.array([1.0]), 1.0) == np.inf
+    assert stationary_variance(np.array([1.2, -0.1]), 1.0) == np.inf

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.diagnosis.arm_tables import joint_columns, write_table
+from defras_bt.benchmark.hidden_tables import joint_columns, write_table
 
 ALL = ("q1", "q2", "q3", "q4", "q5", "q6")
 EVERY = slice(None)

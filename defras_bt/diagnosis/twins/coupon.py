@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from defras_bt.diagnosis.problem import Candidate, Channel, Samples
+from defras_bt.diagnosis.problem import Candidate, Channel, Covariate, Samples
 from defras_bt.diagnosis.quality import DataFault, DataQuality, Mask, Sieve
 from defras_bt.diagnosis.tables import Table
 from defras_bt.diagnosis.tables_quality import measured_rows, quality, rows_in_time, scatter
@@ -110,6 +110,10 @@ class CouponProblem(TableProblem):
         below, above = self.within(0.0, limit), self.within(limit, np.inf)
         enough = all(np.isfinite(p.measured).sum() >= _ENOUGH for p in (below, above))
         return (below, above, f"a stretch of {limit:.2f}") if enough else None
+
+    def covariates(self) -> Sequence[Covariate]:
+        """How far each specimen is stretched."""
+        return (Covariate("the stretch", "1", np.concatenate([r.stretch for r in self.runs])),)
 
     def remarks(self, model: Extension) -> Sequence[str]:
         holds = []

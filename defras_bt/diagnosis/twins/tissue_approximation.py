@@ -1,11 +1,11 @@
 """What the twin itself may be off by: draws of the errors that its mesh and its idea of a jaw make.
 
 Such errors are the same for as long as the tissue is in the same shape, and much the same on
-neighbouring patches. So each draw is a smooth field over the tissue that stays while anything is
-held, and another one for each phase of the motion; forces are off by a share of the largest one.
-Untouched tissue lies where the model says. How large errors are follows from the floors of the
-channels, which say how far models of one and the same tissue on different fine meshes differ: they
-are known before any data.
+neighbouring patches. So each draw is a smooth field over the tissue that stays throughout (as do
+errors of a camera that its scatter at rest does not tell), and another one for each phase of the
+motion; forces are off by a share of the largest one. How large errors are follows from the floors
+of the channels, which say how far models of one and the same tissue on different meshes differ:
+they are known before any data.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ def approximation_errors(samples: Samples, count: int, rng: np.random.Generator)
         mine = samples.trajectory == trajectory
         lasting = mixed @ rng.standard_normal((len(sd), count))
         for phase in np.unique(samples.phase[mine]):
-            if phase == rest:
-                continue
-            passing = mixed @ rng.standard_normal((len(sd), count))
+            passing = np.zeros_like(lasting)
+            if phase != rest:
+                passing = mixed @ rng.standard_normal((len(sd), count))
             rows = mine & (samples.phase == phase)
             found[rows] = ((lasting + passing) / np.sqrt(2.0))[samples.channel[rows]]
     return found

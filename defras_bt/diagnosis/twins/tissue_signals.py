@@ -85,10 +85,10 @@ class Layout:
         return np.asarray((measured.get(arm, np.full((count, 3), np.nan)) - predicted[arm]).T)
 
     def channels(
-        self, noise_sd: Floats, gone_m: Floats, largest_force_n: float
+        self, noise_sd: Floats, gone_m: Floats, largest_force_n: float, mesh_error: Floats
     ) -> tuple[Channel, ...]:
         """Every row with what its sensor scatters (rows,). ``gone_m`` (cells,): how far each patch
-        goes at most."""
+        goes at most; ``mesh_error`` (rows,): what this twin's mesh is known to get wrong."""
         cells, force_floor_n = (
             len(self.grid),
             max(FORCE_FLOOR_N, FORCE_FLOOR_SHARE * largest_force_n),
@@ -98,10 +98,13 @@ class Layout:
             if row < cells:
                 x, y = self.grid.places_m[row]
                 sd = float(noise_sd[row])
-                floor_m = max(CLOUD_FLOOR_M, CLOUD_FLOOR_SHARE * float(gone_m[row]))
+                floor_m = max(
+                    CLOUD_FLOOR_M, CLOUD_FLOOR_SHARE * float(gone_m[row]), float(mesh_error[row])
+                )
                 found.append(Channel(name, "cloud", "m", sd, floor_m, (float(x), float(y))))
             elif row < cells + 3 * len(self.with_force):
-                found.append(Channel(name, "force", "N", float(noise_sd[row]), force_floor_n))
+                floor_n = max(force_floor_n, float(mesh_error[row]))
+                found.append(Channel(name, "force", "N", float(noise_sd[row]), floor_n))
             else:
                 found.append(Channel(name, "tip", "m", float(noise_sd[row]), TIP_FLOOR_M))
         return tuple(found)

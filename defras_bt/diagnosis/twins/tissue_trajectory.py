@@ -47,6 +47,21 @@ class Trajectory:
         """Of the frames (f,)."""
         return np.asarray(self.motion.time_s[self.frames])
 
+    @property
+    def height_m(self) -> Floats:
+        """Of the highest tip that holds tissue, over where it took it, as told (f,); 0 while none
+        holds."""
+        highest = np.zeros(len(self.motion))
+        for arm in self.motion.arms.values():
+            taken = np.flatnonzero(np.diff(arm.grasped.astype(np.int8), prepend=0) == 1)
+            last = np.clip(
+                np.searchsorted(taken, np.arange(len(highest)), side="right") - 1, 0, None
+            )
+            if len(taken):
+                above = arm.position_m[:, 2] - arm.position_m[taken[last], 2]
+                highest = np.maximum(highest, np.where(arm.grasped, above, 0.0))
+        return np.asarray(highest[self.frames])
+
     @cached_property
     def solved(self) -> Integers:
         """The instants (m,) of the motion at which the tissue should be known: between two of them

@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from defras_bt.benchmark.hidden_tables import write_table
 from defras_bt.diagnosis.twins.arm_load import ArmLoadProblem
 from defras_bt.diagnosis.twins.tables import read_problem
 from defras_sim.effects.arm_compliance import USUAL_REACH_M
 from defras_sim.yaml_source import InvalidFile
-from tests.diagnosis.arm_tables import joint_table, write_table
+from tests.diagnosis.arm_tables import joint_table
 
 TRUTH = {"arm_compliance": {"x_m_per_n": 1e-3, "x_growth_per_n": 6e-3}}
 REACHES_M = (0.11, 0.13, 0.15, 0.17, 0.19)

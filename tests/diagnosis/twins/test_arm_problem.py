@@ -5,12 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from defras_bt.benchmark.hidden_tables import joint_columns, random_joints, write_table
 from defras_bt.diagnosis.layout import layout
 from defras_bt.diagnosis.twins.arm import ArmProblem
 from defras_bt.diagnosis.twins.table_problem import added, moved
 from defras_bt.diagnosis.twins.tables import read_problem
 from defras_sim.yaml_source import InvalidFile
-from tests.diagnosis.arm_tables import joint_columns, joint_table, random_joints, write_table
+from tests.diagnosis.arm_tables import joint_table
 
 TRUTH = {
     "joint_play": {"q6_rad": 0.2, "q6_share": 0.6, "q5_dragged_by_q6": 0.4},

@@ -5,12 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from defras_bt.benchmark.hidden_tables import write_table
 from defras_bt.diagnosis.twins.coupon import CouponProblem
 from defras_bt.diagnosis.twins.table_problem import added, moved
 from defras_bt.diagnosis.twins.tables import read_problem
 from defras_sim.geometry import Floats
 from defras_sim.yaml_source import InvalidFile
-from tests.diagnosis.arm_tables import pull_table, write_table
+from tests.diagnosis.arm_tables import pull_table
 
 TRUTH = {
     "strain_stiffening": {"coefficient": 0.2},

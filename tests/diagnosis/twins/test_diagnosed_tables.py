@@ -5,19 +5,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from defras_bt.benchmark.hidden_tables import (
+    joint_columns,
+    random_joints,
+    remembering,
+    write_table,
+)
 from defras_bt.diagnosis.diagnosis import Diagnosis
 from defras_bt.diagnosis.engine import diagnose
 from defras_bt.diagnosis.twins.tables import read_problem
 from defras_sim.arm.true_joints import true_joints
 from defras_sim.effects.effect import Extension
-from tests.diagnosis.arm_tables import (
-    JOINT_NOISE,
-    coloured,
-    joint_columns,
-    pull_table,
-    random_joints,
-    write_table,
-)
+from tests.diagnosis.arm_tables import JOINT_NOISE, pull_table
 
 
 def wrist_diagnosed(folder: Path, model: Extension, seed: int, known: bool = True) -> Diagnosis:
@@ -25,7 +24,7 @@ def wrist_diagnosed(folder: Path, model: Extension, seed: int, known: bool = Tru
     ``known`` or to be told from what changes from row to row."""
     rng = np.random.default_rng(seed)
     time_s, setpoint = random_joints(rng, 500)
-    seen = true_joints(model, time_s, setpoint) + JOINT_NOISE * coloured(rng, 500, 6, 0.95)
+    seen = true_joints(model, time_s, setpoint) + JOINT_NOISE * remembering(rng, 500, 6, 0.95)
     seen[:, :4] = np.nan
     columns = joint_columns(time_s, setpoint, seen)
     for joint in ("q1", "q2", "q4"):

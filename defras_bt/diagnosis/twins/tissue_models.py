@@ -1,0 +1,155 @@
+"""Models led along all trajectories: each once, several side by side, the last ones remembered."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+
+from joblib import Parallel, delayed
+
+from defras_bt.diagnosis.recording_reader import UnusableRecording
+from defras_bt.diagnosis.twins.tissue_correction import MeshCorrection, finer
+from defras_bt.diagnosis.twins.tissue_first_jobs import first_jobs, key_shapes
+from defras_bt.diagnosis.twins.tissue_frames import (
+    TissueFrames,
+    before_the_camera,
+    frames_of,
+    led_along,
+)
+from defras_bt.diagnosis.twins.tissue_part import KeyShapes
+from defras_bt.diagnosis.twins.tissue_passes import led
+from defras_bt.diagnosis.twins.tissue_trajectory import Trajectory
+from defras_sim.effects.effect import Effect, Extension, Values
+from defras_sim.prediction import Prediction
+from defras_sim.scene import Scene
+
+_REMEMBERED = 12
+
+
+class LedModels:
+    """Models of ``scene`` along ``trajectories``, on ``jobs`` processes. Those that differ in how
+    tissue is seen only, by camera and clock, are led along once.
+
+    ``plain``: frames of every trajectory as the plain model has them, the error of its mesh put
+    right; ``uncorrected``: as it is. ``shapes``: its keyframes,
+    with what ``effects`` would change there; none without effects.
+
+    Raises:
+        UnusableRecording: the plain model cannot follow a trajectory at all.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        trajectories: Sequence[Trajectory],
+        effects: Mapping[str, Effect],
+        jobs: int,
+    ) -> None:
+        self._scene, self._trajectories, self._jobs = scene, tuple(trajectories), jobs
+        self._led: OrderedDict[str, tuple[Prediction, ...] | None] = OrderedDict()
+        plain, finest, self.shapes = self._begin(effects)
+        self.uncorrected = tuple(plain)
+        self._corrections = tuple(
+            MeshCorrection.between(one, one if other is None else other)
+            for one, other in zip(plain, finest, strict=True)
+        )
+        self.plain = tuple(
+            correction.applied(each)
+            for correction, each in zip(self._corrections, plain, strict=True)
+        )
+
+    def whole(self, model: Extension) -> dict[str, Values]:
+        """``model`` with the effects that the scene itself adopts, or in their place."""
+        return {**self._scene.model.extension, **model}
+
+    def frames(self, model: Extension) -> tuple[TissueFrames, ...] | None:
+        """What ``model`` says of the frames of every trajectory; None where it cannot."""
+        key = self._key(model)
+        if key not in self._led:
+            self._lead_along({key: model})
+        self._led.move_to_end(key)
+        predictions = self._led[key]
+        if predictions is None:
+            return None
+        return tuple(
+            correction.applied(frames_of(prediction, self._scene, self.whole(model), each))
+            for each, correction, prediction in zip(
+                self._trajectories, self._corrections, predictions, strict=True
+            )
+        )
+
+    def foresee(self, models: Sequence[Extension]) -> None:
+        """Lead several models along at once, before they are asked for one by one."""
+        wanted = {self._key(model): model for model in models if self._key(model) not in self._led}
+        if self._jobs > 1 and len(wanted) * len(self._trajectories) > 1:
+            self._lead_along(wanted)
+
+    def _key(self, model: Extension) -> str:
+        return key_of(before_the_camera(self.whole(model)))
+
+    def _lead_along(self, models: Mapping[str, Extension]) -> None:
+        """Predict tissue and arms of ``models`` by key, side by side, and remember them."""
+        work = [
+            (self.whole(model), each) for model in models.values() for each in self._trajectories
+        ]
+        jobs = self._jobs if len(work) > 1 else 1
+        found = Parallel(n_jobs=jobs, inner_max_num_threads=1)(
+            delayed(led_along)(self._scene, whole, each) for whole, each in work
+        )
+        count = len(self._trajectories)
+        for number, key in enumerate(models):
+            self._remember(key, found[count * number : count * (number + 1)])
+
+    def _remember(self, key: str, predictions: Sequence[Prediction | None]) -> None:
+        followed = tuple(p for p in predictions if p is not None)
+        self._led[key] = followed if len(followed) == len(predictions) else None
+        while len(self._led) > _REMEMBERED:
+            self._led.popitem(last=False)
+
+    def _begin(
+        self, effects: Mapping[str, Effect]
+    ) -> tuple[list[TissueFrames], list[TissueFrames | None], list[KeyShapes]]:
+        """The plain model's frames, those on a finer mesh (None where there is none), and shapes.
+
+        All of it at once; the finer mesh takes longest, and begins first.
+        """
+        scene, whole, fine = self._scene, self.whole({}), finer(self._scene)
+        scenes = [scene] if fine is None else [fine, scene]
+        jobs = [
+            job
+            for each in self._trajectories
+            for job in first_jobs(scene, whole, each, tuple(effects.values()))
+        ]
+        found = Parallel(n_jobs=self._jobs, inner_max_num_threads=1)(
+            [
+                *(
+                    delayed(led_along)(s, whole, each)
+                    for s in scenes
+                    for each in self._trajectories
+                ),
+                *(delayed(led)(job, effects) for job in jobs),
+            ]
+        )
+        count = len(self._trajectories)
+        predicted = found[: count * len(scenes)]
+        self._remember(self._key({}), predicted[-count:])
+        plain: list[TissueFrames] = []
+        finest: list[TissueFrames | None] = []
+        for each, one, other in zip(
+            self._trajectories, predicted[-count:], predicted[:count], strict=True
+        ):
+            if one is None:
+                raise UnusableRecording(
+                    f"{each.name}: the model cannot repeat a grasp that was recorded; it has no "
+                    "tissue there. Is the scene that of this recording, and are its frames right?"
+                )
+            plain.append(frames_of(one, scene, whole, each))
+            if all(surface is None for surface in plain[-1].surfaces):
+                raise UnusableRecording(f"{each.name}: the model finds no equilibrium in any frame")
+            finest.append(None if other is None else frames_of(other, scene, whole, each))
+        return plain, finest, key_shapes(found[count * len(scenes) :], count)
+
+
+def key_of(model: Extension) -> str:
+    """A name of ``model`` by its values."""
+    return repr(sorted((name, sorted(values.items())) for name, values in model.items()))
