@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from defras_bt.benchmark.attachment_cases import HIDDEN, OF_ATTACHMENTS
-from defras_bt.benchmark.attachments import NEAR_M, NOBODY
+from defras_bt.benchmark.attachments import NEAR_M, NOBODY, ORACLE
 from defras_bt.benchmark.retraction import Row
 
 _CONFIDENCE = 0.95
@@ -19,7 +19,7 @@ _DRAWS = 2000
 def summed_up(rows: Sequence[Row], names: Sequence[str]) -> list[dict[str, Any]]:
     """One line per estimator, and one of the belief, over updates with other attachments."""
     lines = []
-    for name in (NOBODY, *names):
+    for name in (NOBODY, *names, ORACLE):
         mine = _asked(rows, name, OF_ATTACHMENTS)
         if not mine:
             continue

@@ -26,6 +26,9 @@ from defras_sim.worlds.error import WorldError
 NOBODY = "belief"
 """The row that says how things stand before any update."""
 
+ORACLE = "actual"
+"""The row of the actual attachments on the twin's mesh: what could be had at best."""
+
 NEAR_M = (0.0, 0.03, 0.06, 0.3)
 """Limits of the distances from the grasp by which precision and recall are told."""
 
@@ -70,9 +73,9 @@ def _rows(hidden: Hidden, seed: int, names: tuple[EstimatorName, ...], world: st
         spent = {"wall_s": perf_counter() - before, "cpu_s": process_time() - cpu}
         values = {**_scored(case, asked, estimate), **spent, "reason": estimate.reason}
         rows.append(Row(case.name, hidden, name, values))
-    belief = asked.belief.attached
-    kept = AttachmentEstimate(belief, belief.astype(float), np.nan, np.nan, False, "")
-    rows.append(Row(case.name, hidden, NOBODY, _scored(case, asked, kept)))
+    for name, attached in ((ORACLE, case.actual.attached), (NOBODY, asked.belief.attached)):
+        known = AttachmentEstimate(attached, attached.astype(float), np.nan, np.nan, False, "")
+        rows.append(Row(case.name, hidden, name, _scored(case, asked, known)))
     return rows
 
 

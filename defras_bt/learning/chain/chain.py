@@ -35,9 +35,9 @@ class ChainEstimator:
     search: SearchSettings = field(default_factory=SearchSettings)
     rule: AdoptionRule = field(default_factory=AdoptionRule)
     sure: tuple[float, ...] = (0.5, 0.75)
-    least_doubt: float = 0.02
-    most_holes: int = 48
-    rounds: int = 3
+    least_doubt: float = 0.004
+    most_holes: int = 90
+    rounds: int = 4
     most_fitted: int = 3
     least_travel_m: float = 0.003
 
