@@ -17,6 +17,7 @@ from defras_bt.cli.benchmark_executive import executive
 from defras_bt.cli.benchmark_faults import faults
 from defras_bt.cli.benchmark_monitor import monitor
 from defras_bt.cli.benchmark_retraction import table1, table2
+from defras_bt.cli.benchmark_stream import stream
 from defras_bt.cli.benchmark_tissue import tissue
 from defras_bt.cli.files import find_scene, folder_for
 
@@ -37,6 +38,7 @@ app.command("diagnosis")(diagnosis)
 app.command("dvrk-faults")(dvrk_faults)
 app.command("faults")(faults)
 app.command("monitor")(monitor)
+app.command("stream")(stream)
 app.command("tissue")(tissue)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from defras_sim.geometry import Floats
 
 _BIN_S = 2e-5
-_LONGEST_S = 0.2
+_LONGEST_S = 2.0
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Durations:
         self.count = 0
 
     def add(self, duration_s: float) -> None:
-        """Longer than 0.2 s count as that, but for :attr:`longest_s`."""
+        """Longer than 2 s count as that, but for :attr:`longest_s`."""
         self._bins[min(max(round(duration_s / _BIN_S), 0), len(self._bins) - 1)] += 1
         self._longest_s = max(self._longest_s, duration_s)
         self.count += 1
