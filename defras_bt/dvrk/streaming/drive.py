@@ -71,7 +71,7 @@ class ArmDrive:
         self._jaw: JawStream | None = None
         self._ends_s = self._ended_s = float("-inf")
         self._told = ""
-        self.standing = Standing()
+        self.standing = Standing(f"{arm.name}: was not looked at yet")
         """What the supervisor said in the latest period."""
 
     @property

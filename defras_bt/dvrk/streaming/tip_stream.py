@@ -36,9 +36,9 @@ class TipStream:
     """Turns velocities for a tick each into poses for a period each.
 
     A command adds its way to where the tip was sent before: silence is a hold, and a command that
-    comes a little late costs nothing, because the stream is a little behind. One that is slower than the
-    last, or goes elsewhere, counts from where the stream is, and so slows it with the next
-    set-point. No command at all stops it as braking allows.
+    comes a little late costs nothing, because the stream is a little behind. One that is slower
+    than the last, or goes elsewhere, counts from where the stream is, and so slows it with the
+    next set-point. No command at all stops it as braking allows.
     """
 
     def __init__(self, limits: Stream, start: Pose) -> None:
