@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from defras_bt.diagnosis.mismatch.finding import MismatchFinding
 from defras_bt.executive.ports import PortValues
+from defras_bt.learning.estimate import AttachmentEstimate
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import GridPoint, Plan
 from defras_bt.recording.operator_state import NOBODY, OperatorState
@@ -77,6 +78,7 @@ class Blackboard:
     ``command`` and ``rate`` start every tick at hold and 1: a rate is always taken from its
     nominal value, never from the tick before. ``force_over_s`` is how long the force has been over
     its threshold or unknown without a break. ``unexplained``: learning last failed.
+    ``posterior``: what it said of the attachments since the grasp, until somebody probed for it.
     ``mismatch``: what a diagnosis since the grasp found. ``slipped``: the first grip at each point
     that was given up for a slip.
     ``failure`` is
@@ -111,6 +113,7 @@ class Blackboard:
     force_over_s: float = 0.0
     last_learning: LearningAttempt | None = None
     unexplained: bool = False
+    posterior: AttachmentEstimate | None = None
     mismatch: MismatchFinding | None = None
     slipped: dict[GridPoint, Grip] = field(default_factory=dict)
     operator_refused: str | None = None

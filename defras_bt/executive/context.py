@@ -13,6 +13,7 @@ from defras_bt.diagnosis.mismatch.finding import MismatchService
 from defras_bt.executive.blackboard import Blackboard
 from defras_bt.learning.chain.estimators import EstimatorName
 from defras_bt.learning.estimate import AttachmentEstimator, Keyframe
+from defras_bt.learning.probe.choice import Tug
 from defras_bt.planning.plan import GridPoint, Plan, Situation
 from defras_sim.geometry import Pose
 from defras_sim.retraction import Rehearsal
@@ -65,6 +66,18 @@ class KeyframeService(Protocol):
     def clear(self) -> None: ...
 
 
+class ProbeService(Protocol):
+    """Finds the small, safe tug that tells most about what holds the tissue."""
+
+    def choose(
+        self,
+        belief: Scene,
+        keyframes: Sequence[Keyframe],
+        explanations: Sequence[NDArray[np.bool_]],
+        force_threshold_n: float,
+    ) -> Tug | None: ...
+
+
 Rehearse = Callable[[Scene, GridPoint, Sequence[str]], Rehearsal]
 
 
@@ -84,6 +97,7 @@ class Context:
     mismatch: MismatchService
     keyframes: KeyframeService
     rehearse: Rehearse
+    probe: ProbeService
     rng: np.random.Generator
     preoperative: Plan | None = None
     approve: Callable[[Plan], bool | None] = field(default=lambda plan: True)

@@ -62,6 +62,7 @@ class GripTracker:
                 self._board.at.pop(name, None)
                 self._board.last_learning = None
                 self._board.unexplained = False
+                self._board.posterior = None
                 self._board.mismatch = None
                 changed = True
         self.contradictions = contradictions

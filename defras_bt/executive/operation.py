@@ -21,6 +21,7 @@ from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
 from defras_bt.faults.faults import NO_FAULTS, FaultInjection, Faults
 from defras_bt.learning.buffer import KeyframeBuffer
 from defras_bt.learning.chain.estimators import estimator
+from defras_bt.learning.probe.choice import ProbeChooser
 from defras_bt.monitoring.warning import WarningMonitor
 from defras_bt.planning.plan import Plan
 from defras_bt.recording.composite import CompositeRecorder
@@ -148,6 +149,7 @@ def operate_in(
             mismatch=MismatchRanking(),
             keyframes=keyframes,
             rehearse=TwinRehearsal(),
+            probe=ProbeChooser(),
             rng=learning_rng,
             preoperative=operation.preoperative,
             approve=operator.approve,

@@ -131,6 +131,9 @@ class Code(ReasonCode):
     NO_SHAPES = "no_shapes", "no shape of the tissue was seen since the grasp", _EVERY_KIND
     DUE = "due", "there is something new to learn from"
     NOT_DUE = "not_due", "nothing new was seen since the last attempt"
+    PROBED = "probed", "the tissue was tugged at to learn more"
+    NOT_DOUBTFUL = "not_doubtful", "learning left nothing about the attachments in doubt"
+    NO_SAFE_TUG = "no_safe_tug", "no small tug is safe and would tell anything"
 
     # Diagnosis of a mismatch
     DIAGNOSED = "diagnosed", "somebody was found to blame for the mismatch"

@@ -26,6 +26,7 @@ BUILTIN_NODE_MODULES: tuple[str, ...] = (
     "defras_bt.acting.let_go",
     "defras_bt.monitoring.guards",
     "defras_bt.learning.nodes",
+    "defras_bt.learning.probe.nodes",
     "defras_bt.diagnosis.mismatch.nodes",
     "defras_bt.planning.nodes",
     "defras_bt.executive.operator_nodes",

@@ -51,6 +51,7 @@ class LearnAttachments(RecoveryLeaf):
             tips_m={name: arm.tissue_from_tip.position_m for name, arm in arms.items()},
         )
         estimate = self._estimator.estimate(context.scene, frames, context.rng)
+        board.posterior = estimate
         before_mm, after_mm = estimate.held_out_before_m * 1e3, estimate.held_out_after_m * 1e3
         data = {
             "adopted": estimate.adopted,

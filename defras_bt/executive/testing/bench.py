@@ -23,6 +23,7 @@ from defras_bt.executive.testing.services import (
     BenchMismatch,
     BenchMonitor,
     BenchPlanner,
+    BenchProbe,
     BenchRehearsal,
     BenchTwin,
     flat_state,
@@ -45,7 +46,7 @@ class NodeBench:
 
     ``says`` overrides fields of :class:`TickInputs` in the next ticks. The services are attributes:
     ``world``, ``twin``, ``monitor``, ``planner``, ``estimator``, ``mismatch``, ``keyframes``,
-    ``rehearse``;
+    ``rehearse``, ``probe``;
     change them between two ticks. ``board`` and ``context`` are what nodes are given.
     """
 
@@ -63,6 +64,7 @@ class NodeBench:
         self.mismatch = BenchMismatch()
         self.keyframes = KeyframeBuffer()
         self.rehearse = BenchRehearsal()
+        self.probe = BenchProbe()
         self.failure: Cause | None = None
         self.board = Blackboard(self._inputs(), metric="local")
         self.grip_tracker = GripTracker(self.board, self.twin)
@@ -75,6 +77,7 @@ class NodeBench:
             mismatch=self.mismatch,
             keyframes=self.keyframes,
             rehearse=self.rehearse,
+            probe=self.probe,
             rng=np.random.default_rng(0),
             preoperative=self.preoperative,
             approve=self.approve,

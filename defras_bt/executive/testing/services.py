@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from defras_bt.diagnosis.mismatch.finding import MismatchCause, MismatchFinding
 from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
+from defras_bt.learning.probe.choice import Tug
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import MANOEUVRES, Action, GridPoint, Plan, Situation
 from defras_bt.planning.planner import NoPlan
@@ -211,3 +212,21 @@ class BenchRehearsal:
         return Rehearsal(
             "psm1", point, tuple(manoeuvres), (seen,), (force_n,), seen, at_m, at_m, True
         )
+
+
+class BenchProbe:
+    """Advises ``tug``; None: no tug is safe. ``asked`` counts the explanations it was given."""
+
+    def __init__(self) -> None:
+        self.tug: Tug | None = None
+        self.asked: list[int] = []
+
+    def choose(
+        self,
+        belief: Scene,
+        keyframes: Sequence[Keyframe],
+        explanations: Sequence[NDArray[np.bool_]],
+        force_threshold_n: float,
+    ) -> Tug | None:
+        self.asked.append(len(explanations))
+        return self.tug
