@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from defras_bt.cli.errors import ExitCode
+from defras_bt.dvrk.ros_packages import INSTALL_LINE, RosMissing, ros_module
 from defras_sim.resources import resource
 from defras_sim.worlds.native_output import STDERR, without_native_output
 
@@ -40,7 +41,7 @@ IMPORT_NAMES = {
 
 def doctor() -> None:
     """Say what is installed, what is missing, and how to get it. Example: defras doctor"""
-    findings = [*_python(), *_packages(), *_data(), *_viewer()]
+    findings = [*_python(), *_packages(), *_data(), *_viewer(), _ros()]
     table = Table("", "what", "found", "how to get it", title="defras doctor")
     for finding in findings:
         mark = "ok" if finding.found else ("MISSING" if finding.needed else "absent")
@@ -97,6 +98,14 @@ def _data() -> list[Finding]:
             found = None
         findings.append(Finding(folder, found, True, "install defras again"))
     return findings
+
+
+def _ros() -> Finding:
+    try:
+        place = ros_module("rospy").__file__
+    except RosMissing:
+        place = None
+    return Finding("ROS 1 (--world dvrk and its stand-in)", place, False, INSTALL_LINE)
 
 
 def _viewer() -> list[Finding]:
