@@ -201,7 +201,7 @@ def _retraction(
         actual = reality(scene, hidden, elements_xyz=_COARSE_REAL_XYZ if coarse else ELEMENTS_XYZ)
         record(actual, script, NoiseSpectrum(), rng, file)
         run = read_recording(file, scene, None)
-        return TissueProblem(scene, [run], tissue_candidates(()), jobs=1)
+        return TissueProblem(scene, [run], tissue_candidates(()), jobs=1, to_score=number > 0)
 
     main = problem(_POINT, 0)
     if coarse or case.board != "one":

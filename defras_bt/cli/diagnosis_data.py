@@ -64,15 +64,15 @@ def tissue_material(asked: Asked, scene: Scene, topics: TopicMap | None) -> Mate
         raise UserError(f"--without: {error}") from error
     jobs = (cpu_count() or 1) if asked.jobs < 0 else asked.jobs
 
-    def problem(runs: Sequence[RecordedRun]) -> TissueProblem:
-        return TissueProblem(scene, runs, candidates, jobs=jobs)
+    def problem(runs: Sequence[RecordedRun], *, to_score: bool = True) -> TissueProblem:
+        return TissueProblem(scene, runs, candidates, jobs=jobs, to_score=to_score)
 
     runs = [read_recording(_recording_in(path), scene, topics) for path in asked.data]
     others = [read_recording(_recording_in(path), scene, topics) for path in asked.held_out]
     known_m = [place for run in runs for place in _grasps_m(run)]
     elsewhere = [run for run in others if _is_elsewhere(_grasps_m(run), known_m)]
     farther = [run for run in others if not any(run is other for other in elsewhere)]
-    main = problem(runs)
+    main = problem(runs, to_score=False)
     return Material(
         main,
         problem(farther) if farther else None,

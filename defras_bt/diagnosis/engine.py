@@ -64,6 +64,11 @@ def diagnose(
         measure_further(found, beyond_range, new_grasp)
         if isinstance(problem, Remarking):
             found.remarks += tuple(problem.remarks(found.search.fit.model))
+        if found.search.was_cut_short:
+            found.remarks += (
+                f"The search ended after {found.search.settings.predictions} predictions of the "
+                "twin; weaker causes beside what was found were not looked for.",
+            )
         found.complete = True
     except KeyboardInterrupt:
         told("interrupted; what was found until now is kept", 1.0)

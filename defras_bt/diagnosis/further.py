@@ -7,7 +7,7 @@ from defras_bt.diagnosis.columns import sketch
 from defras_bt.diagnosis.excess import removed_share
 from defras_bt.diagnosis.findings import Findings
 from defras_bt.diagnosis.fitted import Fit
-from defras_bt.diagnosis.problem import Extrapolating, Problem
+from defras_bt.diagnosis.problem import Extrapolating, Problem, Remarking
 
 
 def measure_further(
@@ -26,6 +26,9 @@ def measure_further(
             gain = _gain(further, found.base, found.search.fit)
             found.further[name] = gain
             found.remarks += _warned(gain, words)
+            if isinstance(further, Remarking):
+                said = further.remarks(found.search.fit.model)
+                found.remarks += tuple(f"{words.capitalize()}: {sentence}" for sentence in said)
     problem = found.search.counted.problem
     if beyond_range is not None or not found.search.accepted():
         return

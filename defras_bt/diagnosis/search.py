@@ -15,7 +15,7 @@ from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.noise import Noise
 from defras_bt.diagnosis.noise_search import Chosen
 from defras_bt.diagnosis.predicted_folds import HeldOut, hold_out
-from defras_bt.diagnosis.problem import Approximating, Samples
+from defras_bt.diagnosis.problem import Approximating, Foreseeing, Samples
 from defras_bt.diagnosis.ranking import Board, board
 from defras_bt.diagnosis.settings import Settings
 from defras_sim.geometry import Floats
@@ -28,7 +28,7 @@ Progress = Callable[[str, float], None]
 class Search:
     """What the selection has found so far; kept up to date, so that an interrupted search can be
     reported. ``fitted_with``: as if the noise were this parameters were fitted in the end, where
-    that predicts better than ``noise``."""
+    that predicts better than ``noise``. ``was_cut_short``: before every candidate had its turn."""
 
     counted: CountedProblem
     samples: Samples
@@ -45,10 +45,18 @@ class Search:
     rounds: list[Round] = field(default_factory=list)
     ranking: tuple[Ranked, ...] = ()
     pairs: tuple[RankedPair, ...] = ()
+    was_cut_short: bool = False
 
     def accepted(self) -> tuple[str, ...]:
         """Candidates of the present model that are not base."""
         return tuple(c.key for c in self.fit.candidates if not c.base)
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether a twin that takes long has predicted as often as it may; what was found by then
+        is settled and said."""
+        long = isinstance(self.counted.problem, Foreseeing)
+        return long and self.counted.calls >= self.settings.predictions
 
     def open_keys(self) -> tuple[str, ...]:
         """Candidates that could still be added, and nuisances that are not in the model."""

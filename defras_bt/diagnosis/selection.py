@@ -34,11 +34,12 @@ _PASSES = 3
 def select(search: Search, told: Progress) -> None:
     """Accept causes until none is left that is better than chance."""
     for _ in range(_PASSES):
-        while len(search.accepted()) < search.settings.causes:
+        while len(search.accepted()) < search.settings.causes and not search.is_spent:
             if not _forward(search, told):
                 break
-        if not restart(search, told):
+        if search.is_spent or not restart(search, told):
             break
+    search.was_cut_short = search.is_spent
     _backward(search, told)
 
 
@@ -87,7 +88,7 @@ def _contested(
     """Fit and judge groups of candidates in turn; whether any of them was accepted."""
     accepted = False
     for index, keys in enumerate(groups):
-        if index and len(search.accepted()) >= search.settings.causes:
+        if index and (len(search.accepted()) >= search.settings.causes or search.is_spent):
             break
         told(f"fitting {', '.join(keys)}", 0.3 + 0.7 * index / len(groups))
         accepted |= accepted_of(search, now, found, keys, limit)

@@ -17,6 +17,7 @@ class Settings:
         iterations: of a full fit; each costs a call of the residual, or a few.
         relative_gain: share of the remaining excess that a cause has to remove, held out.
         outside_share: more of the excess than this left over, and structured, is "outside".
+        predictions: of a twin that takes long, after which no further cause is looked for.
         alike: a pair of causes whose difference is seen in fewer than this share of repetitions of
             the same measurement is a set.
     """
@@ -29,3 +30,4 @@ class Settings:
     relative_gain: float = 0.03
     outside_share: float = 0.3
     alike: float = 0.025
+    predictions: int = 150

@@ -21,6 +21,7 @@ from defras_bt.diagnosis.twins.tissue_signals import Layout
 from defras_bt.diagnosis.twins.tissue_systematic import systematic_errors
 from defras_bt.diagnosis.twins.tissue_tangents import TissueTangents
 from defras_bt.diagnosis.twins.tissue_trajectory import MOST_FRAMES, Trajectory, trajectory
+from defras_bt.diagnosis.twins.tissue_warnings import warning_states, warnings_remark
 from defras_sim.effects.effect import Extension, Values
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
@@ -131,6 +132,19 @@ class TissueProblem:
         """How high held tissue is carried, as told."""
         height = [np.tile(each.height_m, self.layout.rows) for each in self.trajectories]
         return (Covariate("the height of the jaw", "m", np.concatenate(height)),)
+
+    def remarks(self, model: Extension) -> Sequence[str]:
+        """What ``model`` changes of the warnings that the plain one gives."""
+        plain, extended = self.frames({}), self.frames(model)
+        if not model or plain is None or extended is None:
+            return ()
+        cells, phases = len(self.layout.grid), [each.phase for each in self.trajectories]
+        delta_m = self.scene.thresholds.delta_m
+        before, after = (
+            warning_states([block[:cells] for block in self._blocks(frames)], phases, delta_m)
+            for frames in (plain, extended)
+        )
+        return (warnings_remark(before, after),)
 
     def frames(self, model: Extension) -> tuple[TissueFrames, ...] | None:
         """What ``model`` says of the frames of every trajectory; None where it cannot."""
