@@ -94,7 +94,7 @@ class MotionCheck:
             findings.append(judged(name, axis, there))
             if findings[-1].grade == "ok":
                 findings[-1] = judged(name, axis, back) if _poor(back) else findings[-1]
-            if self._camera is not None:
+            if findings[-1].grade == "ok" and self._camera is not None:
                 findings.append(judged_by_camera(name, axis, there))
             if findings[-1].grade == "wrong":
                 break

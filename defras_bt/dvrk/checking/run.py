@@ -23,8 +23,10 @@ from defras_bt.dvrk.checking.messages import (
 )
 from defras_bt.dvrk.checking.motion import MotionCheck, Stopped
 from defras_bt.dvrk.checking.registered import RegistrationCheck
+from defras_bt.dvrk.checking.seen_tool import SeenTool
 from defras_bt.dvrk.checking.tip import TipCheck
 from defras_bt.dvrk.checking.watch import Watch
+from defras_bt.dvrk.checking.whole_cloud import WholeCloud
 from defras_bt.dvrk.checking.workspace import WorkspaceCheck
 from defras_bt.dvrk.crtk.arm import CrtkArm
 from defras_bt.dvrk.laboratory import open_cameras, registered
@@ -32,6 +34,7 @@ from defras_bt.dvrk.settings import Setup
 from defras_bt.dvrk.streaming.servo_loop import StreamReport
 from defras_bt.dvrk.streaming.servo_process import ServoProcess
 from defras_bt.dvrk.transport.connect import connect
+from defras_bt.dvrk.transport.ros1 import Ros1
 from defras_sim.scene import Scene
 
 CHECKS: tuple[Check, ...] = (
@@ -114,8 +117,11 @@ def run_motion(bench: CheckBench, tell: Callable[[Finding], None]) -> list[Findi
     Raises:
         ConnectionFailed: the stream cannot connect.
     """
-    setup = bench.setup
+    setup, camera = bench.setup, bench.setup.cameras.depth
     servo = ServoProcess(setup)
+    cloud: WholeCloud | None = None
+    if camera is not None and camera.cloud is not None and isinstance(bench.transport, Ros1):
+        cloud = WholeCloud(camera.cloud, bench.registration.cameras["depth"].pose)
     try:
         _wait_until_heard(servo)
         frames = {
@@ -126,12 +132,15 @@ def run_motion(bench: CheckBench, tell: Callable[[Finding], None]) -> list[Findi
             servo,
             {name: frames[name] for name in setup.arms},
             {name: arm.name for name, arm in setup.arms.items()},
+            None if cloud is None else SeenTool(bench.scene, cloud.points_m),
             pause=partial(_pause, servo),
         )
         findings = check.run()
         findings.append(_regularity(servo.report()))
     finally:
         servo.close()
+        if cloud is not None:
+            cloud.close()
     for finding in findings:
         tell(finding)
     return findings
