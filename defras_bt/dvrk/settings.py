@@ -2,7 +2,6 @@
 
 ::
 
-    # yaml-language-server: $schema=dvrk.schema.json
     name: bench
     transport: {kind: ros1, master_uri: "http://localhost:11311"}
     arms:
@@ -19,7 +18,7 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -75,7 +74,6 @@ class ArmSetup(Part):
     jaw_length_m: Annotated[float, Field(gt=0, le=0.06)] = WRIST_TO_TIP_M
     closed_rad: Annotated[float, Field(ge=-0.35, le=0.1)] = 0.0
     holds_above_rad: Annotated[float, Field(ge=0.02, le=0.5)] = 0.08
-    tool: str | None = None
 
     @property
     def reported_to_tip_m(self) -> float:
@@ -193,9 +191,3 @@ def load_setup(file: Path) -> Setup:
         InvalidFile: with every fault as file:line:column.
     """
     return read_yaml(file).validate(Setup, context={"folder": file.parent})
-
-
-def setup_schema() -> dict[str, Any]:
-    """JSON schema (draft 2020-12) of set-up files."""
-    schema = Setup.model_json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

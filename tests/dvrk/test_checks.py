@@ -345,6 +345,20 @@ class TestCameras:
         lab.readings = replace(lab.readings, cloud=low)
         assert "12.0 mm below" in worst(lab.find(CameraCheck()), "depth").what
 
+    def test_slow_ones(self, lab: Lab) -> None:
+        bench = lab.bench()
+        cloud = lab.readings.cloud
+        assert cloud is not None
+        looks = [
+            (replace(lab.readings, cloud=replace(cloud, stamp_s=0.4 * (n // 8))), 0.05 * n + 0.1)
+            for n in range(40)
+        ]
+        (found,) = [
+            one for one in CameraCheck().run(replace(bench, looks=looks)) if one.about == "depth"
+        ]
+        assert found.grade == "warning"
+        assert "comes at 2.5 Hz, 10 Hz are usual" in found.what
+
     def test_none_at_all(self, lab: Lab) -> None:
         lab.setup = toy_setup()
         found = lab.find(CameraCheck())

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from defras_bt.dvrk.settings import Ros1Transport, Setup, load_setup, setup_schema
+from defras_bt.dvrk.settings import Ros1Transport, Setup, load_setup
 from defras_sim.yaml_source import InvalidFile
 
 GOOD = """\
@@ -78,7 +78,3 @@ def test_the_fingerprint_is_of_the_content_not_of_the_place(tmp_path: Path) -> N
     assert read(tmp_path / "b", GOOD + "registration: other.yaml\n").fingerprint == one.fingerprint
     other = read(tmp_path / "b", GOOD.replace("reported: jaw", "reported: wrist"))
     assert other.fingerprint != one.fingerprint
-
-
-def test_the_schema_can_be_printed() -> None:
-    assert setup_schema()["properties"]["arms"]

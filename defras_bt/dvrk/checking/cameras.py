@@ -14,6 +14,7 @@ from defras_bt.sensing.sense import MIN_CLOUD_POINTS
 
 _FLAT_M = 0.01
 _OFF_M = 0.006
+_SLOW_SHARE = 0.7
 
 
 class CameraCheck:
@@ -67,6 +68,9 @@ class CameraCheck:
             todo = "Is the tissue at rest, and nothing of its colour beside it?"
             return warning("camera", "depth", what, todo)
         what += f"{abs(off_m) * 1e3:.1f} mm from where the tissue rests"
+        slow = _slow(bench, _cloud_stamp_s, bench.setup.rates.depth_hz)
+        if slow:
+            return warning("camera", "depth", f"{what}; {slow}", "Is the computer busy?")
         return ok("camera", "depth", what)
 
     def _endoscope(self, bench: CheckBench, readings: CameraReadings) -> Finding:
@@ -86,11 +90,29 @@ class CameraCheck:
             todo = "Nothing is to be done, or it takes something else for the region."
             return warning("camera", "endoscope", what, todo)
         what = f"sees {seen:.0%} of the region, {age_s * 1e3:.0f} ms ago in the median"
+        slow = _slow(
+            bench, lambda look: look.roi_visibility_stamp_s, bench.setup.rates.endoscope_hz
+        )
+        if slow:
+            return warning("camera", "endoscope", f"{what}; {slow}", "Is the computer busy?")
         return ok("camera", "endoscope", what)
 
 
 def _cloud_stamp_s(look: CameraReadings) -> float | None:
     return None if look.cloud is None else look.cloud.stamp_s
+
+
+def _slow(
+    bench: CheckBench, stamp_s: Callable[[CameraReadings], float | None], usual_hz: float
+) -> str:
+    """How often readings come, in words, if that is much less than usual; else ""."""
+    stamps = np.unique([at_s for look, _ in bench.looks if (at_s := stamp_s(look)) is not None])
+    if len(stamps) < 2:
+        return ""
+    rate_hz = (len(stamps) - 1) / (stamps[-1] - stamps[0])
+    if rate_hz >= _SLOW_SHARE * usual_hz:
+        return ""
+    return f"it comes at {rate_hz:.1f} Hz, {usual_hz:g} Hz are usual"
 
 
 def _age_s(bench: CheckBench, stamp_s: Callable[[CameraReadings], float | None]) -> float:
