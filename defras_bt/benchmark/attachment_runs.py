@@ -66,22 +66,24 @@ class _Driver:
         """None where the motion ends before any warning, or the model or a grasp fails."""
         if not (self._rest() and self._grasp()):
             return None
-        settling = 0
+        still = 0
         for target_m in self._targets():
             while True:
-                if settling or self._warned():
-                    settling += 1
-                    if settling > _SETTLING_TICKS:
-                        return self._asked()
-                    self._step(np.zeros(3))
-                    continue
+                if self._world.time_s > _MOST_TICKS * self._world.tick_s:
+                    return None
                 way_m = target_m - self._tip_m()
-                if np.linalg.norm(way_m) < 1e-4:
+                if still or self._warned():
+                    if still == _SETTLING_TICKS and self._warned():
+                        return self._asked()
+                    # A warning that passes as the tissue comes to rest asks for nothing.
+                    still = (still + 1) % (_SETTLING_TICKS + 1)
+                    way_m = np.zeros(3)
+                elif np.linalg.norm(way_m) < 1e-4:
                     break
                 most_m = self._believed.motion.tissue_speed_m_s * self._world.tick_s
-                share = min(1.0, most_m / float(np.linalg.norm(way_m)))
+                share = min(1.0, most_m / max(float(np.linalg.norm(way_m)), most_m))
                 self._step(way_m * share / self._world.tick_s)
-                if not self._twin.state.converged or self._world.time_s > self._latest_s():
+                if not self._twin.state.converged:
                     return None
         return None
 
@@ -170,9 +172,6 @@ class _Driver:
 
     def _tip_m(self) -> Floats:
         return self._setpoints()[self._case.arm].position_m
-
-    def _latest_s(self) -> float:
-        return _MOST_TICKS * self._world.tick_s
 
 
 def asked_update(case: UpdateCase, world_name: str) -> Asked | None:

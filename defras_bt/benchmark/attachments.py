@@ -73,9 +73,9 @@ def _rows(hidden: Hidden, seed: int, names: tuple[EstimatorName, ...], world: st
         spent = {"wall_s": perf_counter() - before, "cpu_s": process_time() - cpu}
         values = {**_scored(case, asked, estimate), **spent, "reason": estimate.reason}
         rows.append(Row(case.name, hidden, name, values))
-    for name, attached in ((ORACLE, case.actual.attached), (NOBODY, asked.belief.attached)):
+    for run, attached in ((ORACLE, case.actual.attached), (NOBODY, asked.belief.attached)):
         known = AttachmentEstimate(attached, attached.astype(float), np.nan, np.nan, False, "")
-        rows.append(Row(case.name, hidden, name, _scored(case, asked, known)))
+        rows.append(Row(case.name, hidden, run, _scored(case, asked, known)))
     return rows
 
 
