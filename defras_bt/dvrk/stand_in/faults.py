@@ -11,12 +11,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from defras_bt.executive.registry import did_you_mean
 from defras_sim.scene_parts import ArmName, Part
 from defras_sim.yaml_source import Fault as FileFault
 from defras_sim.yaml_source import InvalidFile, YamlSource, read_yaml
@@ -113,7 +113,8 @@ def fault_of(entry: Any) -> StandInFault:
     """
     name = entry.get("fault") if isinstance(entry, dict) else None
     if name not in KINDS:
-        hint = did_you_mean(str(name), tuple(KINDS))
+        near = get_close_matches(str(name), KINDS, n=1)
+        hint = f", did you mean {near[0]}?" if near else ""
         raise ValueError(f"there is no fault {name!r}{hint}; there are: {', '.join(KINDS)}")
     try:
         return _ADAPTER.validate_python(entry)

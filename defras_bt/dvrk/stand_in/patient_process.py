@@ -20,13 +20,14 @@ from defras_bt.dvrk.stand_in.delivery import Delivery
 from defras_bt.dvrk.stand_in.fault_topic import take_orders
 from defras_bt.dvrk.stand_in.faults import Source
 from defras_bt.dvrk.stand_in.menu import Menu
-from defras_bt.dvrk.stand_in.order import WORLD_TICK_S, StandInOrder
+from defras_bt.dvrk.stand_in.order import WORLD_TICK_S, StandInOrder, WorldName
 from defras_bt.dvrk.stand_in.patient import ArmFeedback, Patient, TipTarget, patient_scene
 from defras_bt.dvrk.stand_in.ros_node import join
 from defras_bt.dvrk.stand_in.witness import Witness, cameras_witness
-from defras_bt.executive.operation import make_world
 from defras_sim.geometry import Pose
+from defras_sim.scene import Scene
 from defras_sim.worlds.error import WorldError
+from defras_sim.worlds.protocol import World
 
 NODE = "defras_patient"
 _LOADING_S = 120.0
@@ -141,7 +142,7 @@ def _live(order: PatientOrder, line: Connection) -> None:
         rospy = join(whole.master_uri, NODE, simulated_clock=whole.simulated_clock)
         world_rng, camera_rng, delivery_rng = np.random.default_rng([whole.seed, 2]).spawn(3)
         actual = whole.imperfections.seen_by(whole.actual)
-        world = make_world(whole.world, patient_scene(actual, WORLD_TICK_S), world_rng)
+        world = _world(whole.world, patient_scene(actual, WORLD_TICK_S), world_rng)
         patient = Patient(world, actual, whole.imperfections, camera_rng)
         patient.start_at(order.tips)
         line.send(Felt(0, patient.feedback()))
@@ -166,3 +167,14 @@ def _live(order: PatientOrder, line: Connection) -> None:
     finally:
         if rospy is not None:
             rospy.signal_shutdown("the stand-in ends")
+
+
+def _world(name: WorldName, scene: Scene, rng: np.random.Generator) -> World:
+    # Each is loaded only where it is wanted: PyBullet is large, and so is the finite-element model.
+    if name == "model":
+        from defras_sim.worlds.model_world import ModelWorld
+
+        return ModelWorld(scene, rng)
+    from defras_sim.worlds.bullet_world import BulletWorld
+
+    return BulletWorld(scene, rng)
