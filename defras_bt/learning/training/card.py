@@ -38,7 +38,7 @@ LIMITS: Mapping[NetworkName, Sequence[str]] = {
 }
 TRIED: Mapping[NetworkName, Sequence[str]] = {
     "banet": (
-        "32 x 32 x 32 voxels would be 4.7 times as many as these 24 x 24 x 12, which are as fine as "
+        "32 x 32 x 32 voxels would be 4.7 times as many as these 24 x 24 x 12, as fine as "
         "the holes are apart; they were not trained.",
     ),
     "sequence": (
