@@ -22,7 +22,8 @@ class ArmReader:
         self._senses_force = senses_force
 
     def read(self, seen: ArmSnapshot, clock: WorldClock) -> ArmObservation:
-        """The observation; its stamp is that of the oldest message in it."""
+        """The observation, stamped as its poses are. Older ones of its messages the stream has
+        judged, and said so."""
         measured, setpoint = seen.measured, seen.setpoint
         jaw, jaw_setpoint = seen.jaw, seen.jaw_setpoint
         assert measured is not None
@@ -30,14 +31,13 @@ class ArmReader:
         assert jaw is not None
         assert jaw_setpoint is not None
         frames, jaw_rad = self.frames, float(jaw.position[0])
-        oldest_s = min(heard.stamp_s for heard in (measured, setpoint, jaw, jaw_setpoint))
         force_n = None
         if seen.wrench is not None and self._senses_force:
             # The wrench is what the arm feels; what it exerts is the opposite.
             force_n = -frames.force_n(seen.wrench.force_n, measured.pose)
         joints, setpoint_joints = seen.joints, seen.setpoint_joints
         return ArmObservation(
-            stamp_s=clock.world_s(oldest_s),
+            stamp_s=clock.world_s(measured.stamp_s),
             tissue_from_tip=frames.tissue_from_tip(measured.pose),
             setpoint_tissue_from_tip=frames.tissue_from_tip(setpoint.pose),
             jaw_rad=jaw_rad,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from defras_bt.dvrk.transport.messages import Message
 
 AnyMessage = TypeVar("AnyMessage", bound=Message)
+_KEPT = 32
 
 
 class Newest(Generic[AnyMessage]):
@@ -24,6 +26,7 @@ class Newest(Generic[AnyMessage]):
         self._now_s = now_s
         self._frame = frame
         self.message: AnyMessage | None = None
+        self._recent: deque[AnyMessage] = deque(maxlen=_KEPT)
         self.fault = ""
         self.heard = 0
         self.repeated = 0
@@ -41,7 +44,16 @@ class Newest(Generic[AnyMessage]):
             self.fault = fault
             return False
         self.message, self.fault = message, ""
+        self._recent.append(message)
         return True
+
+    def at(self, stamp_s: float) -> AnyMessage | None:
+        """The sound message stamped nearest to ``stamp_s``, of the last few; None before any.
+
+        Topics overtake each other on the way: what is compared should be of one moment.
+        """
+        recent = tuple(self._recent)
+        return min(recent, key=lambda said: abs(said.stamp_s - stamp_s), default=None)
 
     def _objection(self, message: AnyMessage) -> str | None:
         """What is wrong; "" nothing, None that it is the last one once more."""

@@ -38,8 +38,9 @@ class ArmMotion:
 
 @dataclass(frozen=True)
 class ArmSnapshot:
-    """One arm as it was last heard. ``goal``: frame_from_tip that it was last told to go to, None
-    while nothing is sent. ``stopped``: why it is not driven, in words."""
+    """One arm as it was last heard; ``setpoint`` is of the moment of ``measured``. ``goal``:
+    frame_from_tip that it was last told to go to, None while nothing is sent. ``stopped``: why it
+    is not driven, in words."""
 
     measured: PoseMessage | None
     setpoint: PoseMessage | None
@@ -129,9 +130,10 @@ class ArmDrive:
         """The arm as last heard. A trip is told at least once, however short it was."""
         arm = self.arm
         told, self._told = self._told or self.standing.trip, ""
+        measured = arm.measured_cp.message
         return ArmSnapshot(
-            arm.measured_cp.message,
-            arm.setpoint_cp.message,
+            measured,
+            None if measured is None else arm.setpoint_cp.at(measured.stamp_s),
             arm.measured_js.message,
             arm.setpoint_js.message,
             arm.jaw.message,

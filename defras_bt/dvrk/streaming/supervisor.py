@@ -98,7 +98,8 @@ class Supervisor:
         return ""
 
     def _astray(self) -> str:
-        measured, setpoint = self._arm.measured_cp.message, self._arm.setpoint_cp.message
+        measured = self._arm.measured_cp.message
+        setpoint = None if measured is None else self._arm.setpoint_cp.at(measured.stamp_s)
         if measured is None or setpoint is None:
             return ""
         away_m = dist(measured.pose.position_m, setpoint.pose.position_m)
