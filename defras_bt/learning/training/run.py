@@ -9,6 +9,7 @@ from typing import Any
 
 import torch
 
+from defras_bt.learning.data.generate import shard_files
 from defras_bt.learning.data.shards import InvalidData
 from defras_bt.learning.networks.weights import NetworkName, write_weights
 from defras_bt.learning.training.card import model_card
@@ -51,7 +52,12 @@ def train_network(
         )
     model.network.load_state_dict(training.best)
     manifest = json.loads((data / "manifest.json").read_text(encoding="utf-8"))
-    card = model_card(name, config, model, parts, settings, training.history, manifest)
+    known = {
+        "format": manifest["format"],
+        "seed": manifest["request"]["seed"],
+        "tissues": len(shard_files(data)),
+    }
+    card = model_card(name, config, model, parts, settings, training.history, known)
     write_weights(out, name, training.best, card)
     return card
 
