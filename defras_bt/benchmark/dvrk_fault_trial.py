@@ -230,6 +230,9 @@ def _judged(
     late_s = 0.0
     if known_s is not None:
         late_s = max(0.0, (last_motion_s(times_s, known_s) or known_s) - known_s)
+    broke = ended.broke
+    if not broke and begun_s == float("inf"):
+        broke = f"the run ended before the fault came ({ended.reason})"
     held, let_go = grips(facts, begun_s, begun_s + LASTS_S)
     needed = {RECORDING: ended.duration_s, NUMBERS: ended.duration_s}
     return DvrkVerdict(
@@ -243,5 +246,5 @@ def _judged(
         grip_lost=let_go and ended.outcome != "goal",
         lost=tuple(lost_recordings(folder, needed)),
         restarts=restarts,
-        broke=ended.broke,
+        broke=broke,
     )
