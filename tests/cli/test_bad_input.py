@@ -92,7 +92,7 @@ def test_a_file_that_is_no_scene(defras: Defras, tmp_path: Path, content: bytes)
     [
         (("run", "nowhere.yaml"), "nowhere.yaml"),
         (("run", "demo", "--world", "mars"), "model, bullet"),
-        (("run", "demo", "--world", "dvrk"), "model, bullet"),
+        (("run", "demo", "--world", "dvrk"), "--setup"),
         (("run", "demo", "--tree", "oak"), "defras"),
         (("run", "demo", "--seed", "-1"), "seed"),
         (("tree", "check", "nothing"), "nothing"),
