@@ -14,9 +14,11 @@ from defras_bt.diagnosis.fitting import Addition, differentiate, extend, refine,
 from defras_bt.diagnosis.held_out import Loss, Products, losses
 from defras_bt.diagnosis.noise import Noise, estimate_noise
 from defras_bt.diagnosis.noise_search import Beside
+from defras_bt.diagnosis.predicted_folds import HeldOut
 from defras_bt.diagnosis.problem import Integers
 from defras_bt.diagnosis.ranking import Board, bounds_of, score, start_of
 from defras_bt.diagnosis.search import Search
+from defras_sim.geometry import Floats
 
 _CLEARLY = 2.0
 """Of the threshold, for causes that are accepted together."""
@@ -83,12 +85,12 @@ def _promising_together(
     if not chosen:
         return []
     while len(chosen) > 1:
-        index, whole = _fitted(now, found, chosen)
+        _, whole = _fitted(now, found, chosen)
         gains = []
         for one in chosen:
             less = [other for other in chosen if other is not one]
             gain = float(_fitted(now, found, less)[1].total[0] / whole.total[0]) - 1.0
-            gains.append(gain if _is_large(search, now, one, index, whole) else -np.inf)
+            gains.append(gain if _is_large(search, now, found, chosen, less) else -np.inf)
         if min(gains) > limit:
             break
         del chosen[int(np.argmin(gains))]
@@ -111,14 +113,23 @@ def _fitted(now: Board, found: Products, chosen: Sequence[_Chosen]) -> tuple[Int
     return index, losses(found, index, bounds)
 
 
-def _is_large(search: Search, now: Board, one: _Chosen, index: Integers, whole: Loss) -> bool:
-    """Whether what a cause changes on the linearised model is worth naming."""
-    amplitudes = whole.amplitudes[:, 0]
-    own = one[2]
-    change = now.columns[:, own] @ amplitudes[np.searchsorted(index, own)]
-    left = search.fit.residual - now.columns[:, index] @ amplitudes
+def _is_large(
+    search: Search,
+    now: Board,
+    found: Products,
+    more: Sequence[_Chosen],
+    less: Sequence[_Chosen],
+) -> bool:
+    """Whether what causes ``more`` explain beyond ``less`` on the linearised model is worth naming.
+    What the others could do as well does not count, and neither does what they undo."""
+
+    def left(causes: Sequence[_Chosen]) -> Floats:
+        index, loss = _fitted(now, found, causes)
+        return np.asarray(search.fit.residual - now.columns[:, index] @ loss.amplitudes[:, 0])
+
+    without, with_it = left(less), left(more)
     share = search.settings.relative_gain
-    return is_practical(change, left + change, left, search.samples, share)
+    return is_practical(without - with_it, without, with_it, search.samples, share)
 
 
 def _needed(search: Search, fit: Fit, key: str, noise: Noise) -> Trial:
@@ -172,12 +183,17 @@ def _settled(search: Search, key: str, noise: Noise) -> Fit:
     return walked(counted, fit, key, noise)
 
 
+def _retuned(search: Search, fit: Fit, held_out: HeldOut, *without: str) -> Floats:
+    """The residual (n,) of ``fit`` with all its parameters and nuisances re-tuned."""
+    columns = np.concatenate((fit.jacobian, search.nuisance_columns(*without)), axis=1)
+    return np.asarray(fit.residual - columns @ held_out.loss.amplitudes[:, 0])
+
+
 def noise_after(search: Search, fits: dict[str, Fit], noise: Noise) -> Noise:
     """Noise of the best of ``fits``, nuisances re-tuned."""
     held_out = {key: search.held_out(fit, noise, key) for key, fit in fits.items()}
     best = min(held_out, key=lambda key: held_out[key].total)
-    columns = np.concatenate((fits[best].jacobian, search.nuisance_columns(best)), axis=1)
-    left = fits[best].residual - columns @ held_out[best].loss.amplitudes[:, 0]
+    left = _retuned(search, fits[best], held_out[best], best)
     return estimate_noise(left, search.samples, search.layout)
 
 
@@ -186,7 +202,7 @@ def _trial(search: Search, key: str, fit: Fit, noise: Noise, less: Fit | None = 
     before = search.fit if less is None else less
     null, with_it = search.held_out(before, noise, key), search.held_out(fit, noise, key)
     practical = is_practical(
-        before.residual - fit.residual,
+        _retuned(search, before, null, key) - _retuned(search, fit, with_it, key),
         null.residual,
         with_it.residual,
         search.samples,

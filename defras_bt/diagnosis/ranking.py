@@ -128,14 +128,15 @@ def start_of(board: Board, found: Products, key: str, option: int) -> tuple[Opti
 
 
 def remainder(
-    board: Board, found: Products, residual: Floats, key: str | None, option: int = 0
+    board: Board, found: Products, residual: Floats, key: str, option: int | None
 ) -> Floats:
-    """``residual`` (n,) less what nuisances and candidate ``key`` explain of it."""
-    index = board.null("")
+    """``residual`` (n,) less what others than candidate ``key`` and, with one of its options, what
+    they and it together explain of it."""
+    index = board.null(key)
     bounds: tuple[Bounded, ...] = ()
-    if key is not None:
+    if option is not None:
         chosen, own = board.of_option[key][option]
-        index = np.concatenate((board.null(key), own))
+        index = np.concatenate((index, own))
         bounds = bounds_of(chosen, own)
     loss = losses(found, index, bounds)
     return np.asarray(residual - board.columns[:, index] @ loss.amplitudes[:, 0])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from defras_bt.diagnosis.diagnosis import Ranked
 from defras_bt.diagnosis.excess import is_practical
 from defras_bt.diagnosis.held_out import Products
-from defras_bt.diagnosis.ranking import Board, alike, remainder, score, start_of
+from defras_bt.diagnosis.ranking import Board, alike, remainder, score
 from defras_bt.diagnosis.search import Search
 
 _NEARLY = 0.7
@@ -31,16 +31,16 @@ def worth_naming(
     """
     scores = score(now, found)
     residual = search.fit.residual
-    without_it = remainder(now, found, residual, None)
     worth, nearly = [], []
     for row in rows:
         if not row.visible:
             continue
         option = int(scores.option[row.key][0])
-        chosen, amplitudes = start_of(now, found, row.key, option)
-        change = chosen.columns @ amplitudes
-        # The accepted causes make room for it, as they will when it is fitted.
+        without_it = remainder(now, found, residual, row.key, None)
+        # The accepted causes make room for it, as they will when it is fitted: what they could do
+        # as well is not its own.
         with_it = remainder(now, found, residual, row.key, option)
+        change = without_it - with_it
         share = search.settings.relative_gain
         if is_practical(change, without_it, with_it, search.samples, share):
             worth.append(row)
