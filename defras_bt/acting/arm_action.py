@@ -17,6 +17,16 @@ from defras_sim.worlds.protocol import ArmCommand, ArmObservation
 ARRIVED_M = 2e-4
 
 
+def arriving_m_s(distance_m: float, speed_m_s: float, tick_s: float, *, goal_ahead: bool) -> float:
+    """The speed that ends at a target: there with the tick where set-points arrive with it.
+
+    ``goal_ahead``: set-points run behind their goal, the less the slower they go, and stay where
+    they are when motion ends. So the last way is halved tick by tick, and little is left of it.
+    """
+    ticks = 2.0 if goal_ahead else 1.0
+    return min(speed_m_s, distance_m / (ticks * tick_s))
+
+
 class ActionParameters(NodeParameters):
     """Which arm acts, and on which grasp point (column, row)."""
 
@@ -66,7 +76,8 @@ class ArmAction(Node):
         distance = hypot(*way.tolist())
         if distance <= ARRIVED_M:
             return True
-        speed = min(speed_m_s, distance / self.context.scene.tick_s)
+        ahead = self.observed.goal_tissue_from_tip is not None
+        speed = arriving_m_s(distance, speed_m_s, self.context.scene.tick_s, goal_ahead=ahead)
         self.context.board.move(self.arm, ArmCommand(linear_m_s=way * (speed / distance)))
         return False
 
