@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from threading import Event
 from time import monotonic
@@ -20,6 +21,7 @@ from defras_bt.dvrk.stand_in.patient_process import Motion, PatientOrder, Patien
 from defras_bt.dvrk.stand_in.psm import Psm
 from defras_bt.dvrk.stand_in.ros_node import join
 from defras_bt.dvrk.stand_in.witness import Witness
+from defras_bt.dvrk.transport.ros1_node import require_master
 from defras_sim.arm.kinematics import tip_pose
 from defras_sim.effects.layers import Layers
 from defras_sim.geometry import Floats, Pose
@@ -33,6 +35,8 @@ LATE_AFTER_S = 0.25
 """A patient this far behind the arms is said to fall behind."""
 
 _WAIT_S = 30.0
+_PRIORITY = 10
+"""Of the process of the arms, 1 to 99; below that of a client's stream."""
 
 
 class StandIn:
@@ -52,12 +56,18 @@ class StandIn:
         self._order = order
         arms_rng, force_rng, delivery_rng = np.random.default_rng([order.seed, 1]).spawn(3)
         self._witness = Witness(order.witness)
-        self._rospy = join(order.master_uri, NODE, simulated_clock=order.simulated_clock)
-        publish_clock = self._clock_publisher() if order.simulated_clock else None
+        require_master(order.master_uri)
         arms = {name: _arm(order, name, arms_rng) for name in order.actual.arms}
         self._patient = PatientProcess(
             PatientOrder(order, {name: arm.drive.tip(NO_FORCE) for name, arm in arms.items()})
         )
+        # Threads inherit this, so before the first one of rospy; the patient must not.
+        if not _goes_first():
+            say(
+                "The system lets the arms run beside other programs only: under load they are late."
+            )
+        self._rospy = join(order.master_uri, NODE, simulated_clock=order.simulated_clock)
+        publish_clock = self._clock_publisher() if order.simulated_clock else None
         if publish_clock is None:
             self._pace: Pace = RealPace(PERIOD_S)
         else:
@@ -157,6 +167,15 @@ class StandIn:
             out.publish(clock_type(self._rospy.Time.from_sec(ros_s)))
 
         return publish
+
+
+def _goes_first() -> bool:
+    """Have this process run before others, as an arm's own computer would; whether it does."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+    except (OSError, AttributeError):
+        return False  # only some systems have it, and only some users may
+    return True
 
 
 def _arm(order: StandInOrder, name: ArmName, rng: np.random.Generator) -> Psm:
