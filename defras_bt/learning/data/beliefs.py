@@ -32,7 +32,7 @@ def _drawn(kind: str, truth: Scene, rng: np.random.Generator) -> Mask:
     if kind == "fewer":
         return resized(grid, max(_FEWEST, round(rng.uniform(0.4, 0.75) * count)), rng).ravel()
     if kind == "more":
-        return resized(grid, round(rng.uniform(1.3, 2.2) * count), rng).ravel()
+        return resized(grid, round(rng.uniform(1.3, 3.5) * count), rng).ravel()
     if kind == "patch_missing":
         return held & ~spread(
             truth, rng.choice(np.flatnonzero(held)), int(rng.integers(2, 10)), rng

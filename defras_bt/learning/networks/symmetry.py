@@ -32,8 +32,10 @@ def mirrored(
     (b, rows, columns) with x or y mirrored, and then both axes exchanged."""
     for wanted, axis, dim in ((x, "x", -1), (y, "y", -2)):
         if wanted:
-            frames = frames.flip(dim) * _signs(FRAME_CHANNELS, axis).view(-1, 1, 1)
-            holes = holes.flip(dim) * _signs(HOLE_CHANNELS, axis).view(-1, 1, 1)
+            sign = _signs(FRAME_CHANNELS, axis).to(frames)
+            frames = frames.flip(dim) * sign.view(-1, 1, 1)
+            sign = _signs(HOLE_CHANNELS, axis).to(holes)
+            holes = holes.flip(dim) * sign.view(-1, 1, 1)
             labels = labels.flip(dim)
     if swap:
         frames = frames[:, :, _swapped(FRAME_CHANNELS)].transpose(-1, -2)

@@ -31,7 +31,8 @@ LIMITS: Mapping[NetworkName, Sequence[str]] = {
         "Slips, moved cameras and stiff spots look like attachments to it.",
     ),
     "sequence": (
-        "Probabilities are right on average over the data's conditions, not for each of them.",
+        "Probabilities are right on average over the data's conditions, not for each of them; "
+        "where beliefs hold much more or less than is there, they are less right.",
         "Trained on tissue of 80 to 150 mm, 3 to 8 mm thick, moved by 4 to 60 mm, no gravity.",
         "Reality is the same model on a finer mesh: other mechanics was never seen in training.",
     ),

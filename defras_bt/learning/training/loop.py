@@ -16,7 +16,7 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from defras_bt.learning.training.encoding import Encoded, Part
-from defras_bt.learning.training.trainable import Trainable, batch
+from defras_bt.learning.training.trainable import Trainable, batch, device_of
 from defras_sim.geometry import Floats
 
 
@@ -98,7 +98,7 @@ class Training:
             best = min([loss, *(e.best_loss for e in self.history[-1:])])
             if loss <= best:
                 state = self._model.network.state_dict()
-                self._best = {name: tensor.clone() for name, tensor in state.items()}
+                self._best = {name: tensor.cpu().clone() for name, tensor in state.items()}
             seconds = perf_counter() - started
             self.history.append(Epoch(number, training_loss, loss, best, seconds))
             self._save()
@@ -114,13 +114,16 @@ class Training:
         order = rng.permutation(len(data))
         batches = np.array_split(order, max(1, round(len(order) / s.batch)))
         weight = head_weights(data, self._model.heads, s.seed)
+        device = device_of(self._model)
         self._model.network.train()
         total = 0.0
         for step, rows in enumerate(batches):
             self._set_rate((number - 1 + step / len(batches)) / s.epochs)
-            labels = _labels(data, rows)
-            inputs, labels = self._model.varied(batch(data, rows), labels, rng)
-            loss = _loss(self._model.logits(inputs), labels, weight[torch.from_numpy(rows)])
+            inputs, labels = self._model.varied(
+                batch(data, rows, device), _labels(data, rows).to(device), rng
+            )
+            drawn = weight[torch.from_numpy(rows)].to(device)
+            loss = _loss(self._model.logits(inputs), labels, drawn)
             self._optimizer.zero_grad()
             loss.backward()
             torch.nn.utils.clip_grad_norm_(self._model.network.parameters(), 1.0)
@@ -148,14 +151,15 @@ class Training:
             for key in ("step", "exp_avg", "exp_avg_sq"):
                 tensors[f"adam.{key}.{name}"] = state[index][key]
         tensor_file = f"checkpoint-{len(self.history)}.safetensors"
-        save_file({k: v.contiguous() for k, v in tensors.items()}, self._folder / tensor_file)
-        content = {
+        content = {name: tensor.cpu().contiguous() for name, tensor in tensors.items()}
+        save_file(content, self._folder / tensor_file)
+        said = {
             "settings": asdict(self._settings),
             "tensors": tensor_file,
             "history": [asdict(epoch) for epoch in self.history],
         }
         partial = self._state_file.with_suffix(".part")
-        partial.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        partial.write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
         os.replace(partial, self._state_file)
         for old in self._folder.glob("checkpoint-*.safetensors"):
             if old.name != tensor_file:
@@ -219,10 +223,11 @@ def _loss(logits: Tensor, labels: Tensor, weight: Tensor) -> Tensor:
 def all_logits(model: Trainable, data: Encoded, size: int = 64) -> Floats:
     """Logits (n, heads, 256) of all samples."""
     model.network.eval()
+    device = device_of(model)
     found = []
     with torch.inference_mode():
         for rows in np.array_split(np.arange(len(data)), max(1, len(data) // size)):
-            found.append(model.logits(batch(data, rows)).numpy())
+            found.append(model.logits(batch(data, rows, device)).cpu().numpy())
     return np.concatenate(found).astype(float)
 
 

@@ -43,6 +43,10 @@ def train_network(
     _require_all(parts, data)
     torch.manual_seed(settings.seed)
     model = trainable(name, config)
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    model.network.to(device)
+    if device.type == "cuda":
+        tell(f"Training on {torch.cuda.get_device_name(device)}.")
     training = Training(out, model, settings, parts, resume=resume)
     for epoch in training.epochs():
         tell(

@@ -57,7 +57,7 @@ class TrainableSequence:
         # Any but the newest may be missing.
         dropped = torch.from_numpy(rng.random(tuple(inputs["known"].shape)) < 0.15)
         dropped[:, -1] = False
-        known = inputs["known"] * ~dropped
+        known = inputs["known"] * ~dropped.to(inputs["known"].device)
         return {"frames": frames, "holes": holes, "known": known}, grid.flatten(-2)
 
 
@@ -93,10 +93,15 @@ def trainable(network: NetworkName, config: Mapping[str, Any]) -> Trainable:
     return TrainableSequence(made) if isinstance(made, SequenceNetwork) else TrainableVoxels(made)
 
 
-def batch(data: Encoded, rows: NDArray[np.int64]) -> Inputs:
-    """The inputs of some samples as tensors; numbers as float32."""
+def device_of(model: Trainable) -> torch.device:
+    """Where the network of ``model`` computes."""
+    return next(model.network.parameters()).device
+
+
+def batch(data: Encoded, rows: NDArray[np.int64], device: torch.device) -> Inputs:
+    """The inputs of some samples as tensors on ``device``; numbers as float32."""
     tensors = {name: torch.from_numpy(values[rows]) for name, values in data.inputs.items()}
     return {
-        name: tensor.long() if tensor.dtype == torch.int32 else tensor.float()
+        name: (tensor.long() if tensor.dtype == torch.int32 else tensor.float()).to(device)
         for name, tensor in tensors.items()
     }
