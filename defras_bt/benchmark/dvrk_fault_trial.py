@@ -37,6 +37,7 @@ from defras_bt.executive.operation import ROBOT_WORLD, Operation, operate_in, ra
 from defras_bt.planning.preparation import Preparation
 from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.decisions import DECISIONS_FILE, DecisionRecorder
+from defras_bt.recording.record import Recorder
 from defras_bt.recording.summary import SummaryRecorder
 from defras_sim.resources import resource
 from defras_sim.scene import Scene, load_scene
@@ -72,7 +73,7 @@ def trial(fault: DvrkFault, prepared: Preparation, folder: Path) -> DvrkVerdict:
         world = open_world(setup, scene, folder)
         trouble = _Trouble(fault, folder, master, stand_in)
         operation = _operation(scene, prepared, fault.seed)
-        recorders = [
+        recorders: list[Recorder] = [
             BagRecorder(folder / RECORDING),
             DecisionRecorder(folder / DECISIONS_FILE),
             SummaryRecorder(folder / NUMBERS),
