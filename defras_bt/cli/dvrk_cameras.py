@@ -40,7 +40,9 @@ def calibrate(
     data: Annotated[
         Path, typer.Argument(help="A bag, an .npz of clouds (frames, points, 3), or an image.")
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for pictures and settings.")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for pictures and settings.")
+    ] = Path("out/cameras"),
     setup: Annotated[
         Path | None, typer.Option(help="Set-up file whose colours to begin with.")
     ] = None,
