@@ -193,6 +193,20 @@ def test_a_second_client_is_found_before_anything_is_sent() -> None:
     assert "is moved by somebody else" in driven.drive.snapshot().stopped
 
 
+def test_a_second_client_is_found_while_only_the_jaw_is_streamed() -> None:
+    driven = DrivenArm()
+    driven.tick(jaw_rad=0.5)
+    driven.period()
+    for _ in range(5):
+        driven.arm.setpoint = driven.arm.setpoint.moved(np.array([0.0, 0.0, 0.0002]))
+        driven.period()
+    driven.tick((0.0, 0.02, 0.0), jaw_rad=0.5)
+    driven.period()
+    assert driven.transport.sent == []
+    assert "is moved by somebody else" in driven.drive.snapshot().stopped
+    assert driven.arm.held == 1, "a hold ends the other's motion too"
+
+
 def test_an_arm_that_does_not_hear_is_found() -> None:
     driven = DrivenArm()
     driven.arm.deaf = True

@@ -121,7 +121,7 @@ class ArmDrive:
 
     def end(self, now_s: float) -> None:
         """Send nothing more; the arm holds."""
-        if self.engaged:
+        if self._tip is not None:
             self._ended_s = now_s
         self._tip = self._jaw = None
         self._echo.restart()
@@ -149,8 +149,9 @@ class ArmDrive:
         if standing.trip:
             return standing
         fault = self._echo.fault
-        alone = not self.engaged and now_s - self._ended_s > _AFTERWARDS_S
-        if not fault and alone and self._echo.moved_m > QUIET_M:
+        # A jaw that is streamed moves no tip.
+        still = self._tip is None and now_s - self._ended_s > _AFTERWARDS_S
+        if not fault and still and self._echo.moved_m > QUIET_M:
             fault = "is moved by somebody else: its set-point changes while nothing is sent here"
         return Standing(f"{self.arm.name} {fault}" if fault else "", standing.wait)
 
