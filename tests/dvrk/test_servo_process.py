@@ -15,7 +15,7 @@ import pytest
 
 from defras_bt.dvrk.settings import Limits, Setup, SocketTransport
 from defras_bt.dvrk.streaming.drive import ArmMotion, ArmSnapshot
-from defras_bt.dvrk.streaming.servo_loop import Tick
+from defras_bt.dvrk.streaming.servo_loop import StreamReport, Tick
 from defras_bt.dvrk.streaming.servo_process import ServoLost, ServoProcess
 from defras_bt.dvrk.streaming.tip_stream import TipVelocity
 from defras_bt.dvrk.transport.transport import ConnectionFailed
@@ -104,6 +104,20 @@ def test_a_process_that_is_killed_is_missed(running: Running) -> None:
     os.kill(running.servo.pid, signal.SIGKILL)
     with pytest.raises(ServoLost, match="has ended"):
         running.arm()
+
+
+def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(running: Running) -> None:
+    os.kill(running.servo.pid, signal.SIGSTOP)
+    try:
+        with pytest.raises(ServoLost, match="is silent for 1 s"):
+            running.servo.snapshot()
+    finally:
+        os.kill(running.servo.pid, signal.SIGCONT)
+    assert isinstance(running.servo.clock_s(), float)
+    assert isinstance(running.servo.report(), StreamReport)
+    assert set(running.servo.snapshot().arms) == {"psm1", "psm2"}
+    running.servo.close()
+    assert running.servo.report().broke == ""
 
 
 def test_nobody_to_connect_to() -> None:

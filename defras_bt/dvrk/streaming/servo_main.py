@@ -15,8 +15,8 @@ from multiprocessing.connection import Connection
 from defras_bt.dvrk.crtk.arm import CrtkArm
 from defras_bt.dvrk.ros_packages import RosMissing
 from defras_bt.dvrk.streaming.command_log import CommandLog
-from defras_bt.dvrk.streaming.servo_loop import ServoLoop, Tick
-from defras_bt.dvrk.streaming.servo_requests import Begin, Begun
+from defras_bt.dvrk.streaming.servo_loop import ServoLoop, Snapshot, StreamReport, Tick
+from defras_bt.dvrk.streaming.servo_requests import Answer, Begin, Begun, Request
 from defras_bt.dvrk.transport.connect import connect
 from defras_bt.dvrk.transport.transport import ConnectionFailed
 
@@ -58,16 +58,24 @@ def _answer_all(loop: ServoLoop, pipe: Connection, realtime: bool) -> None:
             return
         if isinstance(request, Tick):
             loop.command(request)
-        elif request == "snapshot":
-            pipe.send(loop.snapshot())
-        elif request == "clock":
-            pipe.send(loop.clock_s())
-        elif request == "report":
-            pipe.send(replace(loop.report(), realtime=realtime))
-        else:
+            continue
+        if request.question == "close":
             loop.close()
-            pipe.send(replace(loop.report(), realtime=realtime))
+        try:
+            pipe.send(Answer(request.number, _content(loop, request, realtime)))
+        except OSError:
+            # Whoever asked is gone; with the end of the pipe, which comes next, motion ends.
+            continue
+        if request.question == "close":
             return
+
+
+def _content(loop: ServoLoop, request: Request, realtime: bool) -> Snapshot | StreamReport | float:
+    if request.question == "snapshot":
+        return loop.snapshot()
+    if request.question == "clock":
+        return loop.clock_s()
+    return replace(loop.report(), realtime=realtime)
 
 
 def _preferred(priority: int | None) -> bool:

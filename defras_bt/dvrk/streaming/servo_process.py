@@ -11,11 +11,12 @@ import subprocess
 import sys
 from multiprocessing import Pipe
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from defras_bt.dvrk.settings import Setup
 from defras_bt.dvrk.streaming.servo_loop import Snapshot, StreamReport, Tick
-from defras_bt.dvrk.streaming.servo_requests import Begin, Begun, Request
+from defras_bt.dvrk.streaming.servo_requests import Answer, Begin, Begun, Question, Request
 from defras_bt.dvrk.transport.transport import ConnectionFailed
 
 _BEGIN_S = 20.0
@@ -46,8 +47,9 @@ class ServoProcess:
         )
         theirs.close()
         self._report: StreamReport | None = None
+        self._asked = 0
         self._send(Begin(setup, log_file))
-        begun: Begun = self._answer(_BEGIN_S)
+        begun: Begun = self._next(_BEGIN_S, _BEGIN_S)
         if begun.why_not:
             self._process.wait(_END_S)
             raise ConnectionFailed(begun.why_not)
@@ -70,8 +72,7 @@ class ServoProcess:
         Raises:
             ServoLost: the process is gone, or does not answer.
         """
-        self._send("snapshot")
-        snapshot: Snapshot = self._answer(_ANSWER_S)
+        snapshot: Snapshot = self._ask("snapshot")
         return snapshot
 
     def clock_s(self) -> float:
@@ -79,8 +80,7 @@ class ServoProcess:
         Raises:
             ServoLost: the process is gone, or does not answer.
         """
-        self._send("clock")
-        clock_s: float = self._answer(_ANSWER_S)
+        clock_s: float = self._ask("clock")
         return clock_s
 
     def report(self) -> StreamReport:
@@ -90,16 +90,18 @@ class ServoProcess:
         """
         if self._report is not None:
             return self._report
-        self._send("report")
-        report: StreamReport = self._answer(_ANSWER_S)
+        report: StreamReport = self._ask("report")
         return report
 
     def close(self) -> None:
+        """
+        Raises:
+            ServoLost: the process does not answer; it was ended.
+        """
         if self._report is not None or self._process.poll() is not None:
             return
         try:
-            self._send("close")
-            self._report = self._answer(_END_S)
+            self._report = self._ask("close", _END_S)
         finally:
             self._pipe.close()
             try:
@@ -114,9 +116,21 @@ class ServoProcess:
         except OSError as error:
             raise ServoLost(f"the process that drives the arms has ended ({error})") from error
 
-    def _answer(self, within_s: float) -> Any:
+    def _ask(self, question: Question, within_s: float = _ANSWER_S) -> Any:
+        """The answer to ``question``, and to no other one: after a time-out the answer that was
+        waited for still comes, and must not be taken for the next one."""
+        self._asked += 1
+        self._send(Request(self._asked, question))
+        until_s = monotonic() + within_s
+        while True:
+            answer: Answer = self._next(max(0.0, until_s - monotonic()), within_s)
+            if answer.number == self._asked:
+                return answer.content
+
+    def _next(self, left_s: float, within_s: float) -> Any:
+        """What comes next within ``left_s``, all that is left of ``within_s``."""
         try:
-            if not self._pipe.poll(within_s):
+            if not self._pipe.poll(left_s):
                 raise ServoLost(f"the process that drives the arms is silent for {within_s:g} s")
             return self._pipe.recv()
         except (EOFError, OSError) as error:

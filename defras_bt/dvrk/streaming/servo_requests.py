@@ -4,12 +4,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from defras_bt.dvrk.settings import Setup
 
-Request = Literal["snapshot", "clock", "report", "close"]
-"""Each is answered once. A tick is not answered."""
+Question = Literal["snapshot", "clock", "report", "close"]
+
+
+@dataclass(frozen=True)
+class Request:
+    """Answered once, with the same ``number``: an answer that comes too late is told from the one
+    that is waited for. A tick is not answered."""
+
+    number: int
+    question: Question
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was asked for by the request of this ``number``."""
+
+    number: int
+    content: Any
 
 
 @dataclass(frozen=True)
