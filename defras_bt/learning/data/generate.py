@@ -17,6 +17,7 @@ from defras_bt.learning.data.samples import SAMPLES_PER_WALK
 from defras_bt.learning.data.shards import FORMAT, InvalidData, write_shard
 from defras_sim.scene import Scene
 
+MANIFEST = "manifest.json"
 PATIENTS_PER_SHARD = 10
 _WALKS_PER_PATIENT = 2.4
 """Measured: some patients are grasped once, and what is not due to attachments has one belief."""
@@ -88,16 +89,48 @@ def open_manifest(out: Path, request: Request) -> None:
     """Note in the folder what was asked for.
 
     Raises:
-        InvalidData: the folder holds data of another seed or format.
+        InvalidData: the folder holds data of another seed or format, or a broken manifest.
     """
-    file = out / "manifest.json"
+    file = out / MANIFEST
     if file.exists():
-        known = json.loads(file.read_text(encoding="utf-8"))
-        if known.get("format") != FORMAT or known["request"]["seed"] != request.seed:
+        known = read_manifest(out)
+        if known.seed != request.seed:
             raise InvalidData(
-                f"{out} holds data of format {known.get('format')!r} and seed "
-                f"{known['request']['seed']}; asked for are {FORMAT!r} and {request.seed}: "
-                "choose another folder"
+                f"{out} holds data of seed {known.seed}; asked for is {request.seed}: choose "
+                "another folder"
             )
     content = {"format": FORMAT, "request": asdict(request)}
     file.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+
+
+def read_manifest(folder: Path) -> Request:
+    """What was asked for when the data in ``folder`` was made.
+
+    Raises:
+        InvalidData: the manifest is missing, broken, or of another format.
+    """
+    file = folder / MANIFEST
+    if not file.is_file():
+        raise InvalidData(
+            f"{file} is missing, which says how the data was made; restore it, or make data anew: "
+            "defras train data --out DIR"
+        )
+    try:
+        said = json.loads(file.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InvalidData(f"{file} cannot be read as JSON: {error}; choose another folder") from (
+            error
+        )
+    if not isinstance(said, dict) or said.get("format") != FORMAT:
+        found = said.get("format") if isinstance(said, dict) else None
+        raise InvalidData(
+            f"{file} has the format {found!r}; readable is {FORMAT!r}: choose another folder"
+        )
+    request = said.get("request")
+    if not isinstance(request, dict) or not all(
+        isinstance(request.get(key), int) for key in ("seed", "samples")
+    ):
+        raise InvalidData(
+            f"{file}: request has to hold whole numbers seed and samples, not {request!r}"
+        )
+    return Request(request["seed"], request["samples"])

@@ -24,6 +24,8 @@ from __future__ import annotations
 
 import json
 import os
+import zipfile
+import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -129,10 +131,36 @@ def read_shard(file: Path) -> Shard:
     Raises:
         InvalidData: the file is no shard of this format.
     """
+    try:
+        return _read_shard(file)
+    except InvalidData:
+        raise
+    except _BROKEN as error:
+        raise InvalidData(
+            f"{file} cannot be read as a shard ({type(error).__name__}: {error}); remove it, and "
+            "defras train data makes it again"
+        ) from error
+
+
+_BROKEN = (
+    AttributeError,
+    EOFError,
+    IndexError,
+    KeyError,
+    TypeError,
+    ValueError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What numpy, zip, JSON and the scene's model raise of a file that was cut or is something else."""
+
+
+def _read_shard(file: Path) -> Shard:
+    number = int(file.stem)
     with np.load(file, allow_pickle=False) as stored:
-        if "meta" not in stored:
-            raise InvalidData(f"{file} is no shard of training data; defras train data makes them")
         arrays = dict(stored)
+    if "meta" not in arrays:
+        raise InvalidData(f"{file} is no shard of training data; defras train data makes them")
     meta = json.loads(arrays["meta"].tobytes())
     if meta.get("format") != FORMAT:
         raise InvalidData(f"{file} has the format {meta.get('format')!r}; readable is {FORMAT!r}")
@@ -154,7 +182,7 @@ def read_shard(file: Path) -> Shard:
         )
         grasps = [_grasp(arrays, f"{p}/{g}", said) for g, said in enumerate(about["grasps"])]
         patients.append(RecordedPatient(scene, about["cause"], grasps))
-    return Shard(int(file.stem), rest, patients)
+    return Shard(number, rest, patients)
 
 
 def _grasp(arrays: dict[str, NDArray[Any]], key: str, about: dict[str, Any]) -> RecordedGrasp:

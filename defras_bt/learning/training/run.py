@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import torch
 
-from defras_bt.learning.data.generate import shard_files
-from defras_bt.learning.data.shards import InvalidData
+from defras_bt.learning.data.generate import read_manifest, shard_files
+from defras_bt.learning.data.shards import FORMAT, InvalidData
 from defras_bt.learning.networks.weights import NetworkName, write_weights
 from defras_bt.learning.training.card import model_card
 from defras_bt.learning.training.encoding import PARTS, Encoded, Part, encoded
@@ -34,10 +33,11 @@ def train_network(
     The card is returned. ``tell`` hears a sentence after each epoch.
 
     Raises:
-        InvalidData: the folder holds too little data, or none.
+        InvalidData: the folder holds too little data, none, or data that cannot be read.
         OtherTraining: with ``resume``, the checkpoint in ``out`` is of another training.
     """
     torch.set_num_threads(threads)
+    asked = read_manifest(data)
     tell("Reading the data.")
     parts = encoded(data, name, lambda done, of: None)
     _require_all(parts, data)
@@ -55,10 +55,9 @@ def train_network(
             f"{epoch.seconds:.0f} s"
         )
     model.network.load_state_dict(training.best)
-    manifest = json.loads((data / "manifest.json").read_text(encoding="utf-8"))
     known = {
-        "format": manifest["format"],
-        "seed": manifest["request"]["seed"],
+        "format": FORMAT,
+        "seed": asked.seed,
         "tissues": len(shard_files(data)),
     }
     card = model_card(name, config, model, parts, settings, training.history, known)
