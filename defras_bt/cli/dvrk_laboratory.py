@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from defras_bt.recording.record import Recorder
 
 
-def checked_laboratory(file: Path | None, scene: Scene) -> Setup:
-    """The set-up of ``file``, if a fresh check of it has passed for ``scene``.
+def checked_laboratory(file: Path | None, scene: Scene) -> tuple[Setup, Scene]:
+    """The set-up of ``file``, if a fresh check of it has passed for ``scene``; and ``scene`` at the
+    speed of that robot.
 
     Raises:
         UserError: there is none, or no check allows a run.
@@ -24,6 +25,7 @@ def checked_laboratory(file: Path | None, scene: Scene) -> Setup:
     """
     # Loaded only where a robot is asked for.
     from defras_bt.dvrk.checking.report import NotChecked, require_checked
+    from defras_bt.dvrk.laboratory import at_robot_speed
     from defras_bt.dvrk.settings import load_setup
 
     if file is None:
@@ -36,7 +38,7 @@ def checked_laboratory(file: Path | None, scene: Scene) -> Setup:
         require_checked(setup, scene, datetime.now(UTC))
     except NotChecked as error:
         raise UserError(f"--world dvrk: {error}") from error
-    return setup
+    return setup, at_robot_speed(scene, setup)
 
 
 def connected(setup: Setup, scene: Scene, out: Path | None) -> DvrkWorld:

@@ -100,7 +100,7 @@ def run(
     laboratory = None
     if world == ROBOT_WORLD:
         _require_no_trial(actual=actual, substitute=substitute, faults=faults)
-        laboratory = checked_laboratory(setup, believed)
+        laboratory, believed = checked_laboratory(setup, believed)
     elif setup is not None:
         raise UserError(f"--setup {setup}: only --world {ROBOT_WORLD} has a laboratory")
     actual_file, truth = find_scene(actual) if actual is not None else (None, believed)

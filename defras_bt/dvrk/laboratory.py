@@ -51,6 +51,14 @@ def registered(setup: Setup, scene: Scene) -> Registration:
     return found
 
 
+def at_robot_speed(scene: Scene, setup: Setup) -> Scene:
+    """``scene`` with arms that reach no faster than the set-up allows."""
+    motion = scene.motion
+    slowest_m_s = min(motion.reach_speed_m_s, setup.stream.reach_speed_m_s)
+    slowed = motion.model_copy(update={"reach_speed_m_s": slowest_m_s})
+    return scene.model_copy(update={"motion": slowed})
+
+
 def open_cameras(setup: Setup, registration: Registration, scene: Scene) -> CameraSource:
     """The cameras of ``setup``; over ROS 1 this process becomes a node.
 

@@ -202,6 +202,13 @@ class TestRefusal:
         assert require_checked(setup, scene, NOW + timedelta(hours=1)) == report
         assert read_check(setup.checked).passed
 
+    def test_a_run_goes_no_faster_than_the_robot(self, setup: Setup, scene: Scene) -> None:
+        self.write(setup, scene, checked=datetime.now(UTC))
+        _, slowed = checked_laboratory(setup.checked.with_name("lab.yaml"), scene)
+        assert scene.motion.reach_speed_m_s == 0.05
+        assert slowed.motion.reach_speed_m_s == 0.04
+        assert slowed.motion.tissue_speed_m_s == scene.motion.tissue_speed_m_s
+
     @pytest.mark.parametrize(
         ("changes", "after_h", "says"),
         [

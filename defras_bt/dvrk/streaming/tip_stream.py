@@ -11,7 +11,7 @@ from defras_bt.dvrk.settings import Stream
 from defras_bt.dvrk.streaming.approach import Approach, ApproachLimits
 from defras_sim.geometry import Floats, Pose
 
-_CATCH_UP = 1.2
+_CATCH_UP = 1.1
 """So much faster than commanded the stream may go to make good what it is behind."""
 _BEHIND_TICKS = 0.5
 """So much it stays behind: a command that comes a little late finds it still moving."""
