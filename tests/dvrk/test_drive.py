@@ -254,6 +254,22 @@ def test_an_executive_that_hangs_is_not_waited_for(driven: DrivenArm) -> None:
     assert not driven.period().any()
 
 
+def test_the_jaw_of_an_executive_that_hangs_stops_as_well() -> None:
+    driven = DrivenArm()
+    driven.tick(jaw_rad=0.8)
+    for _ in range(20):
+        driven.period()
+    reached_rad = driven.arm.jaw_setpoint_rad
+    watched_s = driven.stream.watchdog_s + 2 * PERIOD_S
+    assert 0.0 < reached_rad <= driven.stream.jaw_rad_s * watched_s
+    for _ in range(20):
+        driven.period()
+    assert driven.arm.jaw_setpoint_rad == reached_rad
+    driven.tick(jaw_rad=0.8)
+    driven.period()
+    assert driven.arm.jaw_setpoint_rad > reached_rad, "who commands again is heard again"
+
+
 def test_nothing_is_sent_before_the_first_motion() -> None:
     driven = DrivenArm()
     for _ in range(5):
@@ -269,8 +285,10 @@ def test_a_jaw_goes_at_its_speed_and_grips_as_the_set_up_says() -> None:
     driven.tick(jaw_rad=0.8)
     driven.period()
     assert driven.arm.jaw_setpoint_rad == pytest.approx(driven.stream.jaw_rad_s * PERIOD_S)
-    for _ in range(60):
-        driven.period()
+    for _ in range(12):
+        driven.tick(jaw_rad=0.8)
+        for _ in range(5):
+            driven.period()
     assert driven.arm.jaw_setpoint_rad == pytest.approx(0.8)
 
 

@@ -104,8 +104,8 @@ class ArmDrive:
         if self.standing.trip:
             self._trip(self.standing.trip, now_s)
             return False
-        if now_s > self._ends_s and self._tip is not None and self._tip.moving:
-            self._tip.stop()
+        if now_s > self._ends_s:
+            self._stop_by_itself()
         if self._tip is not None:
             if self.standing.wait:
                 self._tip.wait()
@@ -161,6 +161,13 @@ class ArmDrive:
             self.arm.hold()
         self._told = self._told or why
         self.end(now_s)
+
+    def _stop_by_itself(self) -> None:
+        """Nobody commands any more: what moves stops, what is gripped stays gripped."""
+        if self._tip is not None and self._tip.moving:
+            self._tip.stop()
+        if self._jaw is not None:
+            self._jaw.stop()
 
     def _pursue_jaw(self, jaw_rad: float) -> None:
         if self._jaw is None:

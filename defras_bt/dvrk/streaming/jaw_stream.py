@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class JawStream:
-    """The jaw keeps its last goal through every hold: what was gripped stays gripped."""
+    """The jaw keeps its last set-point through every hold: what was gripped stays gripped."""
 
     def __init__(self, speed_rad_s: float, start_rad: float) -> None:
         self._speed_rad_s = speed_rad_s
