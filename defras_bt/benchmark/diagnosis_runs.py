@@ -66,7 +66,7 @@ class BoardRow:
 
 @dataclass(frozen=True)
 class Without:
-    """``problem`` for somebody whose library lacks ``effects``."""
+    """``problem`` of tables for somebody whose library lacks ``effects``."""
 
     problem: Problem
     effects: tuple[str, ...]
@@ -134,10 +134,9 @@ def board_row(case: BoardCase, *, coarse: bool, baselines: bool) -> BoardRow:
 def _asked(case: BoardCase, *, coarse: bool, baselines: bool) -> BoardRow:
     with TemporaryDirectory() as folder:
         made = _made(case, Path(folder), coarse=coarse)
-        lacking = tuple(cause.split("@")[0] for cause in case.causes)
         problem: Problem = made.problem
-        if case.board == "lacking":
-            problem = Without(problem, lacking)
+        if case.board == "lacking" and case.twin != "tissue":
+            problem = Without(problem, _effects(case))
         began = time.perf_counter()
         told = diagnose(
             problem,
@@ -193,6 +192,8 @@ def _retraction(
     for one in drawn:
         hidden |= {effect: dict(values) for effect, values in one.hidden.items()}
 
+    candidates = tissue_candidates(_effects(case) if case.board == "lacking" else ())
+
     def problem(point: tuple[int, int], number: int) -> TissueProblem:
         # Other retractions go other ways: their heights and speeds are drawn anew.
         script = draw(scene, NULL, case.seed + 7919 * number, point).script
@@ -201,12 +202,17 @@ def _retraction(
         actual = reality(scene, hidden, elements_xyz=_COARSE_REAL_XYZ if coarse else ELEMENTS_XYZ)
         record(actual, script, NoiseSpectrum(), rng, file)
         run = read_recording(file, scene, None)
-        return TissueProblem(scene, [run], tissue_candidates(()), jobs=1, to_score=number > 0)
+        return TissueProblem(scene, [run], candidates, jobs=1, to_score=number > 0)
 
     main = problem(_POINT, 0)
     if coarse or case.board != "one":
         return _Material(main, None, None, hidden)
     return _Material(main, problem(_POINT, 1), problem(_OTHER_POINT, 2), hidden)
+
+
+def _effects(case: BoardCase) -> tuple[str, ...]:
+    """The effects that a case hides."""
+    return tuple(cause.split("@")[0] for cause in case.causes)
 
 
 def _key(effect: str, site: str) -> str:
