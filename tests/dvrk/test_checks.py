@@ -201,6 +201,26 @@ def test_joints_of_other_names(lab: Lab) -> None:
     assert "yaw, pitch, insertion" in found.todo
 
 
+@pytest.mark.parametrize(
+    ("topic", "angles_rad", "says"),
+    [
+        ("jaw/measured_js", [], "has 0 joints; a jaw has one angle"),
+        ("jaw/measured_js", [0.1, -0.1], "has 2 joints; a jaw has one angle"),
+        ("jaw/setpoint_js", [np.nan], "is nan, which is not an angle"),
+    ],
+)
+def test_a_jaw_of_no_angle_or_two(lab: Lab, topic: str, angles_rad: list[float], says: str) -> None:
+    def spoilt(arm: str, of: str, said: Message) -> Message:
+        if arm == "PSM1" and of == topic and isinstance(said, JointMessage):
+            return replace(said, position=np.array(angles_rad))
+        return said
+
+    lab.transport.spoil = spoilt
+    bench = lab.bench()
+    assert says in worst(NamesCheck().run(bench)).what
+    assert {one.about for one in UnitsCheck().run(bench)} == {"PSM1", "PSM2"}
+
+
 def test_another_frame(lab: Lab) -> None:
     lab.transport.spoil = lambda arm, topic, said: (
         replace(said, frame="ECM")
@@ -250,6 +270,13 @@ def test_clocks_out_of_step(lab: Lab, late_s: float, says: str) -> None:
     lab.late_s = late_s
     found = [one for one in lab.find(ClockCheck()) if one.check == "clock"]
     assert says in worst(found).what
+
+
+def test_a_clock_a_little_ahead_is_no_negative_latency(lab: Lab) -> None:
+    lab.late_s = -0.012
+    clock, latency = [one.what for one in lab.find(ClockCheck()) if one.about == "PSM1"]
+    assert clock == "clocks agree within 12.0 ms"
+    assert latency == "99 of 100 messages are here within 0.0 ms"
 
 
 def test_messages_that_take_too_long_now_and_then(lab: Lab) -> None:
@@ -329,6 +356,14 @@ class TestCameras:
         found = lab.find(CameraCheck())
         assert "0.70 s old" in worst(found, "depth").what
         assert "0.70 s old" in worst(found, "endoscope").what
+
+    def test_from_the_future(self, lab: Lab) -> None:
+        lab.camera_age_s = -0.45
+        found = lab.find(CameraCheck())
+        assert "450 ms in the future" in worst(found, "depth").what
+        assert "450 ms in the future" in worst(found, "endoscope").what
+        lab.camera_age_s = -0.01
+        assert "wrong" not in {one.grade for one in lab.find(CameraCheck())}
 
     def test_what_the_source_found(self, lab: Lab) -> None:
         lab.readings = replace(lab.readings, faults={"cloud": "the cloud is in millimetres"})

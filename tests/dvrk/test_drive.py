@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from defras_bt.dvrk.settings import Limits
-from defras_bt.dvrk.transport.messages import Message, PoseMessage
+from defras_bt.dvrk.transport.messages import JointMessage, Message, PoseMessage
 from defras_sim.geometry import Pose
 from tests.dvrk.toy_robot import BEGIN_S, PERIOD_S, DrivenArm, restamped
 
@@ -96,6 +96,16 @@ def in_frame(frame: str) -> Callable[[DrivenArm], None]:
     )
 
 
+def jaw_of(topic: str, *angles_rad: float) -> Callable[[DrivenArm], None]:
+    return spoil(
+        lambda of, said: (
+            replace(said, position=np.array(angles_rad))
+            if of == topic and isinstance(said, JointMessage)
+            else said
+        )
+    )
+
+
 def jump(driven: DrivenArm) -> None:
     driven.arm.measured = driven.arm.setpoint.moved(np.array([0.02, 0.0, 0.0]))
 
@@ -124,6 +134,18 @@ FAULTS = {
     "another frame": (in_frame("ECM"), "in the frame 'ECM'; the set-up says 'PSM1_base'"),
     "a jump": (jump, "its measured pose jumped by 20.0 mm"),
     "not a number": (not_a_number, "is not a number"),
+    "a jaw that is no number": (
+        jaw_of("jaw/measured_js", np.nan),
+        "jaw/measured_js of PSM1 is nan, which is not an angle",
+    ),
+    "a jaw's set-point that is no number": (
+        jaw_of("jaw/setpoint_js", np.nan),
+        "jaw/setpoint_js of PSM1 is nan, which is not an angle",
+    ),
+    "a jaw without an angle": (
+        jaw_of("jaw/setpoint_js"),
+        "jaw/setpoint_js of PSM1 has 0 joints; a jaw has one angle",
+    ),
 }
 
 
@@ -290,6 +312,18 @@ def test_a_jaw_goes_at_its_speed_and_grips_as_the_set_up_says() -> None:
         for _ in range(5):
             driven.period()
     assert driven.arm.jaw_setpoint_rad == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize("angles_rad", [(), (float("nan"),)])
+def test_no_jaw_is_driven_from_where_nobody_knows(angles_rad: tuple[float, ...]) -> None:
+    driven = DrivenArm()
+    jaw_of("jaw/setpoint_js", *angles_rad)(driven)
+    for _ in range(5):
+        driven.tick(jaw_rad=0.8)
+        for _ in range(5):
+            driven.period()
+    assert driven.transport.jaws == []
+    assert "angle" in driven.drive.snapshot().stopped
 
 
 def test_a_state_that_must_be_repeated_is_missed_when_it_is_not() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from math import isfinite
 from typing import Generic, TypeVar
 
 from defras_bt.dvrk.crtk.newest import Newest
@@ -51,8 +53,8 @@ class CrtkArm:
         self.local_cp = self._heard("local/measured_cp", PoseMessage)
         self.measured_js = self._heard("measured_js", JointMessage)
         self.setpoint_js = self._heard("setpoint_js", JointMessage)
-        self.jaw = self._heard("jaw/measured_js", JointMessage)
-        self.jaw_setpoint = self._heard("jaw/setpoint_js", JointMessage)
+        self.jaw = self._heard("jaw/measured_js", JointMessage, unsound=_no_jaw)
+        self.jaw_setpoint = self._heard("jaw/setpoint_js", JointMessage, unsound=_no_jaw)
         self.wrench = self._heard("body/measured_cf", WrenchMessage)
         self.operating_state = self._heard("operating_state", StateMessage)
 
@@ -111,7 +113,10 @@ class CrtkArm:
 
     def faults(self) -> tuple[str, ...]:
         """What is wrong with messages that still come, one sentence a topic."""
-        heard = (self.measured_cp, self.setpoint_cp, self.jaw, self.operating_state)
+        heard = (
+            *(self.measured_cp, self.setpoint_cp),
+            *(self.jaw, self.jaw_setpoint, self.operating_state),
+        )
         return tuple(one.fault for one in heard if one.fault)
 
     def _fresh(self, heard: Newest[AnyOf], topic: str) -> Stamped[AnyOf]:
@@ -125,10 +130,27 @@ class CrtkArm:
             )
         return Stamped(heard.message, heard.message.stamp_s, age_s)
 
-    def _heard(self, topic: str, kind: type[AnyOf], frame: str = "") -> Newest[AnyOf]:
-        newest: Newest[AnyOf] = Newest(f"{topic} of {self.name}", self._transport.now_s, frame)
+    def _heard(
+        self,
+        topic: str,
+        kind: type[AnyOf],
+        frame: str = "",
+        unsound: Callable[[AnyOf], str] = lambda message: "",
+    ) -> Newest[AnyOf]:
+        newest: Newest[AnyOf] = Newest(
+            f"{topic} of {self.name}", self._transport.now_s, frame, unsound
+        )
         self._transport.listen(self.name, topic, newest.offer)
         return newest
 
 
 AnyOf = TypeVar("AnyOf", PoseMessage, JointMessage, StateMessage, WrenchMessage)
+
+
+def _no_jaw(said: JointMessage) -> str:
+    """Why ``said`` cannot be of a jaw; what is sent to a jaw begins at what it says."""
+    if len(said.position) != 1:
+        return f"has {len(said.position)} joints; a jaw has one angle"
+    if not isfinite(said.position[0]):
+        return f"is {said.position[0]}, which is not an angle"
+    return ""

@@ -17,12 +17,21 @@ class Newest(Generic[AnyMessage]):
 
     A message repeated by the network is dropped in silence. One that is older, from the future, or
     in another frame than ``frame`` ("" for any) is refused with a sentence in ``fault``, which
-    stands until a sound message comes. ``stamps`` counts what came, ``refused`` what was wrong.
+    stands until a sound message comes; so is one that ``unsound`` objects to. ``heard`` counts what
+    came, ``refused`` what was wrong.
     """
 
-    def __init__(self, what: str, now_s: Callable[[], float], frame: str = "") -> None:
-        """``what`` it is in words; ``now_s`` tells the time on the clock of the stamps."""
+    def __init__(
+        self,
+        what: str,
+        now_s: Callable[[], float],
+        frame: str = "",
+        unsound: Callable[[AnyMessage], str] = lambda message: "",
+    ) -> None:
+        """``what`` it is in words; ``now_s`` tells the time on the clock of the stamps;
+        ``unsound`` says what is wrong with a message's content, "" for nothing."""
         self._what = what
+        self._unsound = unsound
         self._now_s = now_s
         self._frame = frame
         self.message: AnyMessage | None = None
@@ -65,6 +74,9 @@ class Newest(Generic[AnyMessage]):
                 f"{self._what} comes in the frame {message.frame!r}; the set-up says "
                 f"{self._frame!r}"
             )
+        unsound = self._unsound(message)
+        if unsound:
+            return f"{self._what} {unsound}"
         late_s = stamp_s - self._now_s()
         if late_s > FUTURE_S:
             return f"{self._what} is stamped {late_s:.2f} s in the future"
