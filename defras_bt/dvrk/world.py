@@ -54,6 +54,7 @@ class DvrkWorld:
             KeyError: an arm is not registered.
         """
         self.tick_s = scene.tick_s
+        self._ahead_s = setup.limits.clock_offset_s
         self._servo, self._cameras = servo, cameras
         self._names: dict[str, str] = {name: arm.name for name, arm in setup.arms.items()}
         self._readers: dict[str, ArmReader] = {
@@ -191,19 +192,24 @@ class DvrkWorld:
     ) -> Observation:
         cloud, depth, picture = readings.cloud, readings.depth_image, readings.endoscope_image
         faults = {_READINGS.get(what, what): why for what, why in readings.faults.items()}
-        visible_s = readings.roi_visibility_stamp_s
+        visible_s, now_s = readings.roi_visibility_stamp_s, self._clock.now_s()
+
+        def camera_s(stamp_s: float) -> float:
+            return self._by_now_s(self._camera_s(stamp_s), now_s)
+
         return Observation(
-            time_s=self._clock.now_s(),
-            arms=arms,
-            cloud=None if cloud is None else replace(cloud, stamp_s=self._camera_s(cloud.stamp_s)),
-            depth_image=None
-            if depth is None
-            else replace(depth, stamp_s=self._camera_s(depth.stamp_s)),
+            time_s=now_s,
+            arms={
+                name: replace(arm, stamp_s=self._by_now_s(arm.stamp_s, now_s))
+                for name, arm in arms.items()
+            },
+            cloud=None if cloud is None else replace(cloud, stamp_s=camera_s(cloud.stamp_s)),
+            depth_image=None if depth is None else replace(depth, stamp_s=camera_s(depth.stamp_s)),
             endoscope_image=None
             if picture is None
-            else replace(picture, stamp_s=self._camera_s(picture.stamp_s)),
+            else replace(picture, stamp_s=camera_s(picture.stamp_s)),
             roi_visibility=readings.roi_visibility,
-            roi_visibility_stamp_s=None if visible_s is None else self._camera_s(visible_s),
+            roi_visibility_stamp_s=None if visible_s is None else camera_s(visible_s),
             stopped={**stopped, **faults},
         )
 
@@ -221,6 +227,11 @@ class DvrkWorld:
         if picture is not None and self._camera_s(picture.stamp_s) < 0.0:
             readings = replace(readings, endoscope_image=None)
         return readings
+
+    def _by_now_s(self, world_s: float, now_s: float) -> float:
+        """World time of a stamp, which a clock that is ahead by no more than the check allows puts
+        at the present; one of a later future stays there, and is not acted on."""
+        return min(world_s, now_s) if world_s - now_s <= self._ahead_s else world_s
 
     def _camera_s(self, stamp_s: float) -> float:
         """World time of a camera's stamp."""

@@ -16,6 +16,7 @@ from defras_bt.dvrk.streaming.servo_loop import Snapshot, StreamReport, Tick
 from defras_bt.dvrk.streaming.servo_process import ServoLost
 from defras_bt.dvrk.transport.transport import ConnectionFailed
 from defras_bt.dvrk.world import DvrkWorld
+from defras_bt.sensing.freshness import ages_s, stale
 from defras_sim.geometry import Pose
 from defras_sim.scene import Attachments, Roi, Scene
 from defras_sim.worlds.protocol import HOLD, ArmCommand, Command, PointCloud, StreamsSetpoints
@@ -51,6 +52,7 @@ class ToyServo:
     def __init__(self) -> None:
         self.arms = {"psm1": ToyArm("PSM1"), "psm2": ToyArm("PSM2")}
         self.now_s = BEGIN_S
+        self.late_s = 0.002
         self.stopped: Mapping[str, str] = {}
         self.goal: Pose | None = None
         self.ticks: list[Tick] = []
@@ -69,7 +71,7 @@ class ToyServo:
         self.now_s += SCENE.tick_s
         arms = {
             name: replace(
-                snapshot_of(arm, self.now_s - 0.002),
+                snapshot_of(arm, self.now_s - self.late_s),
                 stopped=self.stopped.get(name, ""),
                 goal=self.goal,
             )
@@ -229,6 +231,23 @@ class TestWhatGoesWrong:
         monkeypatch.setattr("defras_bt.dvrk.world._BEGIN_S", 0.1)
         with pytest.raises(ConnectionFailed, match="PSM1 and PSM2 did not say everything"):
             DvrkWorld(toy_setup(), SCENE, BASES, servo, cameras)
+
+
+@pytest.mark.parametrize(("ahead_s", "acts"), [(0.012, True), (0.045, False)])
+def test_clocks_a_little_ahead_are_no_future(
+    ahead_s: float, acts: bool, servo: ToyServo, cameras: ToyCameras
+) -> None:
+    servo.late_s = -ahead_s
+    world = DvrkWorld(toy_setup(), SCENE, BASES, servo, cameras)
+    stamp_s = servo.now_s + SCENE.tick_s + ahead_s
+    cloud = PointCloud(stamp_s, np.zeros((30, 3)))
+    cameras.readings = CameraReadings(
+        cloud=cloud, roi_visibility=0.3, roi_visibility_stamp_s=stamp_s
+    )
+    world.step()
+    seen = world.observe()
+    assert (stale(seen, SCENE) == {}) is acts
+    assert not acts or ages_s(seen, SCENE)["psm1"] == 0.0
 
 
 class TestCameras:

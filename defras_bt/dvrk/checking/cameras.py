@@ -42,6 +42,9 @@ class CameraCheck:
             return wrong(
                 "camera", "depth", what, "defras dvrk cameras calibrate shows what it sees."
             )
+        ahead = _ahead(bench, "depth", _cloud_stamp_s)
+        if ahead is not None:
+            return ahead
         age_s, limit_s = _age_s(bench, _cloud_stamp_s), bench.setup.limits.camera_age_s
         if not age_s <= limit_s:
             what = f"its clouds are {age_s:.2f} s old in the median when they are needed"
@@ -80,6 +83,9 @@ class CameraCheck:
             what = fault or "no picture of the region has come"
             todo = "defras dvrk cameras calibrate shows what it sees."
             return wrong("camera", "endoscope", what, todo)
+        ahead = _ahead(bench, "endoscope", lambda look: look.roi_visibility_stamp_s)
+        if ahead is not None:
+            return ahead
         age_s = _age_s(bench, lambda look: look.roi_visibility_stamp_s)
         limit_s = bench.setup.limits.camera_age_s
         if not age_s <= limit_s:
@@ -113,6 +119,25 @@ def _slow(
     if rate_hz >= _SLOW_SHARE * usual_hz:
         return ""
     return f"it comes at {rate_hz:.1f} Hz, {usual_hz:g} Hz are usual"
+
+
+def _ahead(
+    bench: CheckBench, camera: str, stamp_s: Callable[[CameraReadings], float | None]
+) -> Finding | None:
+    """What is wrong with a camera whose clock is ahead: a run acts on nothing from the future."""
+    limit_s = bench.setup.limits.clock_offset_s
+    ahead_s = max(
+        (at_s - now_s for look, now_s in bench.looks if (at_s := stamp_s(look)) is not None),
+        default=0.0,
+    )
+    if ahead_s <= limit_s:
+        return None
+    what = f"it is stamped {ahead_s * 1e3:.0f} ms in the future"
+    todo = (
+        "Keep the clocks of its computer and this one in step (chrony or ptp); "
+        f"{limit_s * 1e3:g} ms are allowed."
+    )
+    return wrong("camera", camera, what, todo)
 
 
 def _age_s(bench: CheckBench, stamp_s: Callable[[CameraReadings], float | None]) -> float:
