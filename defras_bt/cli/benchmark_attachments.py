@@ -42,6 +42,7 @@ def attachments(
 
     Half of the seeds have fewer attachments than believed, half have more. Other mismatches are
     slips, bumped cameras, unknown second tools and stiff spots, for which nothing should change.
+    Rows stay in the folder, so that --resume with more updates goes on from them.
 
     Example: defras benchmark attachments --world bullet --updates 60 --others 5
     """
@@ -86,10 +87,12 @@ def attachments(
         "Updates": run_rows(asked),
     }
     write_benchmark(out, name, "Learning attachments", tables, notes)
-    shown = Table(*summary[0])
-    for line in summary:
-        shown.add_row(*("-" if v is None else str(v) for v in line.values()))
-    Console().print(shown)
+    if summary:
+        # One column per estimator: there are more numbers than a terminal is wide.
+        shown = Table("", *(str(line["estimator"]) for line in summary))
+        for key in list(summary[0])[1:]:
+            shown.add_row(key, *(str(line[key]) for line in summary))
+        Console().print(shown)
     typer.echo(f"Written to {out}: {name}.json, {name}.csv, {name}.html")
 
 
