@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -91,7 +92,7 @@ def attachments(
         # One column per estimator: there are more numbers than a terminal is wide.
         shown = Table("", *(str(line["estimator"]) for line in summary))
         for key in list(summary[0])[1:]:
-            shown.add_row(key, *(str(line[key]) for line in summary))
+            shown.add_row(escape(key), *(str(line[key]) for line in summary))
         Console().print(shown)
     typer.echo(f"Written to {out}: {name}.json, {name}.csv, {name}.html")
 
