@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -47,10 +48,11 @@ def check(
     believed = find_scene(scene)[1]
     laboratory = load_setup(setup)
     folder_for(out)
-    console.print(f"Listening to {laboratory.name} for {LISTEN_S:g} s.", markup=False)
+    said = f"Listening to {laboratory.name} for {LISTEN_S:g} s."
+    listening = partial(console.print, said, markup=False)
     moved = False
     try:
-        with check_bench(laboratory, believed, out) as bench:
+        with check_bench(laboratory, believed, out, listening) as bench:
             findings = run_checks(bench, lambda finding: _tell(console, finding))
             sound = not any(one.grade == "wrong" for one in findings)
             if sound and _may_move(console, approve=approve):

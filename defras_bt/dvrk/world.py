@@ -138,8 +138,13 @@ class DvrkWorld:
         """Stop both arms and listen no more; grips stay as they are."""
         self.command(HOLD)
         self._report = self.stream_values()
-        self._servo.close()
-        self._cameras.close()
+        try:
+            self._servo.close()
+        except ServoLost as lost:
+            # It was ended, and the arms hold; who asks for the stream's numbers gets none.
+            self._lost = str(lost)
+        finally:
+            self._cameras.close()
 
     def _look(self) -> float:
         try:

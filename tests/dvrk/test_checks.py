@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from defras_bt.dvrk.camera_settings import Cameras, DepthCamera, Endoscope
 from defras_bt.dvrk.camera_source import CameraReadings, NoCameras
+from defras_bt.dvrk.checking import run
 from defras_bt.dvrk.checking.arm_state import CommandersCheck, RestCheck, StateCheck
 from defras_bt.dvrk.checking.bench import Check, CheckBench
 from defras_bt.dvrk.checking.cameras import CameraCheck
@@ -32,6 +33,8 @@ from defras_bt.dvrk.checking.workspace import WorkspaceCheck
 from defras_bt.dvrk.crtk.arm import CrtkArm
 from defras_bt.dvrk.registering.registration import Placed, Registration
 from defras_bt.dvrk.settings import Limits, Setup
+from defras_bt.dvrk.streaming.servo_loop import Snapshot
+from defras_bt.dvrk.streaming.servo_process import ServoLost
 from defras_bt.dvrk.transport.messages import JointMessage, Message, PoseMessage
 from defras_sim.arm.kinematics import tip_pose
 from defras_sim.geometry import Pose
@@ -405,3 +408,23 @@ def test_no_room_for_the_recording(lab: Lab) -> None:
         {**lab.setup.model_dump(), "limits": Limits(disk_free_mb=1e9).model_dump()}
     )
     assert "MB are free" in worst(lab.find(DiskCheck()), "computer").what
+
+
+class LostServo:
+    """Hears nothing of its process any more, from the first question on."""
+
+    def __init__(self, setup: Setup) -> None:
+        pass
+
+    def snapshot(self) -> Snapshot:
+        raise ServoLost("the process that drives the arms has ended (exit code -9)")
+
+    def close(self) -> None:
+        raise ServoLost("the process that drives the arms is silent for 5 s")
+
+
+def test_a_stream_that_is_lost_is_a_finding(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "ServoProcess", LostServo)
+    told: list[Finding] = []
+    assert run.run_motion(lab.bench(), told.append) == told
+    assert "the process that drives the arms" in worst(told, "computer").what

@@ -58,6 +58,7 @@ class ToyServo:
         self.ticks: list[Tick] = []
         self.lost = ""
         self.silent = False
+        self.hangs = False
         self.closed = False
 
     def command(self, tick: Tick) -> None:
@@ -91,6 +92,8 @@ class ToyServo:
 
     def close(self) -> None:
         self.closed = True
+        if self.hangs:
+            raise ServoLost("the process that drives the arms is silent for 5 s")
 
 
 class ToyCameras:
@@ -290,6 +293,15 @@ class TestCameras:
         world.step()
         assert world.observe().cloud is None
         assert world.observe().roi_visibility is None
+
+
+def test_a_process_that_hangs_at_the_end_keeps_no_camera_open(
+    world: DvrkWorld, servo: ToyServo, cameras: ToyCameras
+) -> None:
+    servo.hangs = True
+    world.close()
+    assert servo.closed
+    assert cameras.closed
 
 
 def test_closing_stops_and_closes_everything(

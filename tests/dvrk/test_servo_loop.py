@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic, sleep
@@ -106,6 +107,25 @@ def test_a_stream_that_breaks_says_so_and_sends_no_more(
     assert "RuntimeError: publish() to a closed topic" in loop.snapshot().broke
     loop.close()
     assert transport.sent == []
+
+
+def test_a_full_disk_ends_the_stream_and_says_so(
+    transport: LiveTransport, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = CommandLog()
+    loop = looping(transport, log)
+
+    def full(now_s: float = float("inf")) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(log, "write", full)
+    wait_for(lambda: loop.snapshot().broke)
+    wait_for(lambda: not loop._thread.is_alive())
+    loop.command(Tick({"psm1": ArmMotion(UP)}, 0.05))
+    sleep(0.05)
+    assert transport.sent == []
+    loop.close()
+    assert "cannot be logged: [Errno 28] No space left on device" in loop.report().broke
 
 
 class TestBeat:

@@ -32,7 +32,7 @@ from defras_bt.dvrk.crtk.arm import CrtkArm
 from defras_bt.dvrk.laboratory import open_cameras, registered
 from defras_bt.dvrk.settings import Setup
 from defras_bt.dvrk.streaming.servo_loop import StreamReport
-from defras_bt.dvrk.streaming.servo_process import ServoProcess
+from defras_bt.dvrk.streaming.servo_process import ServoLost, ServoProcess
 from defras_bt.dvrk.transport.connect import connect
 from defras_bt.dvrk.transport.ros1 import Ros1
 from defras_sim.scene import Scene
@@ -63,8 +63,11 @@ _HEARD_S = 15.0
 
 
 @contextmanager
-def check_bench(setup: Setup, scene: Scene, out: Path) -> Iterator[CheckBench]:
+def check_bench(
+    setup: Setup, scene: Scene, out: Path, listening: Callable[[], object] = lambda: None
+) -> Iterator[CheckBench]:
     """Listen to everything for some seconds; what was connected is closed at the end.
+    ``listening`` is called when everybody has answered.
 
     Raises:
         NotRegistered: arms or cameras are not registered.
@@ -77,6 +80,7 @@ def check_bench(setup: Setup, scene: Scene, out: Path) -> Iterator[CheckBench]:
         transport = connect(setup, "defras_check")
         try:
             arms = {name: CrtkArm(arm, transport) for name, arm in setup.arms.items()}
+            listening()
             # While connections are being made, topics come late and one after the other.
             sleep(_CONNECT_S)
             watches = {name: Watch(arm.name, transport) for name, arm in setup.arms.items()}
@@ -117,6 +121,22 @@ def run_motion(bench: CheckBench, tell: Callable[[Finding], None]) -> list[Findi
     Raises:
         ConnectionFailed: the stream cannot connect.
     """
+    try:
+        findings = _motion(bench)
+    except ServoLost as lost:
+        todo = "The arms hold where they are. Is this computer busy, or was a process ended?"
+        findings = [wrong("stream", "computer", str(lost), todo)]
+    for finding in findings:
+        tell(finding)
+    return findings
+
+
+def _motion(bench: CheckBench) -> list[Finding]:
+    """
+    Raises:
+        ConnectionFailed: the stream cannot connect.
+        ServoLost: the process that streams does not answer.
+    """
     setup, camera = bench.setup, bench.setup.cameras.depth
     servo = ServoProcess(setup)
     cloud: WholeCloud | None = None
@@ -138,11 +158,11 @@ def run_motion(bench: CheckBench, tell: Callable[[Finding], None]) -> list[Findi
         findings = check.run()
         findings.append(_regularity(servo.report()))
     finally:
-        servo.close()
-        if cloud is not None:
-            cloud.close()
-    for finding in findings:
-        tell(finding)
+        try:
+            servo.close()
+        finally:
+            if cloud is not None:
+                cloud.close()
     return findings
 
 

@@ -128,7 +128,7 @@ class ServoLoop:
         for thread in (self._thread, self._writer):
             if thread.ident is not None:
                 thread.join()
-        self._log.write()
+        self._write_log()
 
     def _run(self) -> None:
         try:
@@ -140,7 +140,7 @@ class ServoLoop:
 
     def _stream(self) -> None:
         beat, streamed = self._beat(), False
-        while not self._end.is_set():
+        while not (self._end.is_set() or self.broke):
             elapsed_s = beat.wait()
             if streamed:
                 self._periods.add(elapsed_s)
@@ -169,7 +169,14 @@ class ServoLoop:
 
     def _write(self) -> None:
         while not self._end.wait(_LOG_EVERY_S):
-            self._log.write(self._transport.now_s())
+            self._write_log(self._transport.now_s())
+
+    def _write_log(self, now_s: float = float("inf")) -> None:
+        """What cannot be recorded is not sent either: the stream ends, and says why."""
+        try:
+            self._log.write(now_s)
+        except OSError as error:
+            self.broke = self.broke or f"set-points cannot be logged: {error}"
 
 
 def _two(durations: Durations) -> tuple[float, float]:
