@@ -14,6 +14,7 @@ from rich.console import Console
 
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import find_scene
+from defras_bt.diagnosis.extended_scene import extended_name
 from defras_bt.dvrk.crtk.arm import CrtkArm, NotFresh
 from defras_bt.dvrk.registering.adoption import NothingToAdopt, adopted, without_adopted
 from defras_bt.dvrk.registering.landmarks import (
@@ -35,6 +36,7 @@ from defras_bt.dvrk.ros_packages import RosMissing
 from defras_bt.dvrk.settings import Setup, load_setup
 from defras_bt.dvrk.transport.connect import connect
 from defras_bt.dvrk.transport.transport import ConnectionFailed
+from defras_bt.recording.whole_file import write_whole
 from defras_sim.scene import Scene
 from defras_sim.scene_file import write_scene
 from defras_sim.scene_parts import ArmName
@@ -102,7 +104,7 @@ def register(
         raise UserError(f"register {what}: {error}") from error
     _tell(console, laboratory, landmarks, fit)
     placed = Placed.of(fit.parent_from_child, fit)
-    registration = _known(laboratory, believed, now)
+    registration = _known(console, laboratory, believed, now)
     for arm in (name for name in _ARMS if name == what):
         registration = registration.with_arm(arm, placed, now)
     for camera in (name for name in _CAMERAS if name == what):
@@ -113,14 +115,24 @@ def register(
     )
 
 
-def _known(setup: Setup, scene: Scene, now: datetime) -> Registration:
-    """What is registered already, if that was for this scene."""
-    if not setup.registration.is_file():
+def _known(console: Console, setup: Setup, scene: Scene, now: datetime) -> Registration:
+    """What is registered already, if that was for this scene; otherwise it is kept aside."""
+    file = setup.registration
+    if not file.is_file():
         return Registration(measured=now, scene=scene.name)
-    known = read_registration(setup.registration)
+    known = read_registration(file)
     if known.scene == scene.name:
         return known
     # Cameras may have stayed where they are, but the tissue has not: nothing of it holds.
+    kept = file.with_name(f"{file.stem}_{known.measured:%Y%m%dT%H%M%S}{file.suffix}")
+    write_whole(kept, file.read_text(encoding="utf-8"))
+    gone = ", ".join((*known.arms, *known.cameras)) or "nothing"
+    console.print(
+        f"{file} was measured for the scene {known.scene!r}: what it says ({gone}) does not hold "
+        f"for {scene.name!r}, and has to be registered anew. It is kept in {kept}",
+        style="bold yellow",
+        markup=False,
+    )
     return Registration(measured=now, scene=scene.name)
 
 
@@ -185,13 +197,25 @@ def _adopt(console: Console, setup: Setup, scene: Scene, found: Path | None, now
     extended = find_scene(str(found))[1]
     if not setup.registration.is_file():
         raise UserError(f"{setup.registration} does not exist: register arms and cameras first")
+    known = read_registration(setup.registration)
+    if known.scene != scene.name:
+        raise UserError(
+            f"register adopt: {setup.registration} was measured for the scene {known.scene!r}, not "
+            f"for {scene.name!r}; nothing was changed"
+        )
+    if extended.name not in (scene.name, extended_name(scene)):
+        raise UserError(
+            f"register adopt: {found} is the scene {extended.name!r}, not {extended_name(scene)!r} "
+            "as a diagnosis of it writes; nothing was changed"
+        )
     try:
-        registration = adopted(_known(setup, scene, now), extended, now)
+        registration = adopted(known, extended, now)
     except NothingToAdopt as error:
         raise UserError(f"--found {found}: {error}") from error
-    write_registration(registration, setup.registration)
     rest = found.with_name(f"{found.stem}_registered.yaml")
-    write_scene(without_adopted(extended), rest)
+    # Registrations are of a patient by name, and this is the one that was registered.
+    write_scene(without_adopted(extended).model_copy(update={"name": scene.name}), rest)
+    write_registration(registration, setup.registration)
     console.print(
         f"Written to {setup.registration}; go on with {rest}, which has the rest of what was "
         "found. Check again before you run.",

@@ -20,6 +20,11 @@ FULL_NAME = "believed_scene.yaml"
 """The believed scene, where the extended one cannot stand on the file that it was read from."""
 
 
+def extended_name(scene: Scene) -> str:
+    """What ``scene`` is called once a diagnosis has extended it."""
+    return f"{scene.name}_extended"
+
+
 def adopted_effects(scene: Scene, verdict: Verdict) -> list[dict[str, Any]]:
     """``model.effects`` of the extended scene: those of ``scene``, with what was found.
 
@@ -71,7 +76,7 @@ def _text(scene: Scene, base: str, verdict: Verdict) -> str:
     document = CommentedMap(
         {
             "extends": base,
-            "name": f"{scene.name}_extended",
+            "name": extended_name(scene),
             "description": f"{scene.name} with what a diagnosis named.",
             "model": CommentedMap({"effects": effects}),
         }

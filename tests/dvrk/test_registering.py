@@ -35,6 +35,7 @@ from defras_sim.effects.layers import Layers
 from defras_sim.geometry import Pose
 from defras_sim.resources import resource
 from defras_sim.scene import Scene, load_scene
+from defras_sim.scene_file import write_scene
 from defras_sim.worlds.force_sensor import NO_FORCE
 from defras_sim.yaml_source import InvalidFile
 from tests.dvrk.toy_robot import PERIOD_S, ToyTransport, toy_setup
@@ -167,6 +168,18 @@ class TestAdopting:
         with pytest.raises(NothingToAdopt, match="neither tool_offset nor camera_registration"):
             adopted(Registration(measured=NOW, scene="demo"), scene, NOW)
 
+    @pytest.mark.parametrize(
+        ("effect", "says"),
+        [
+            ("tool_offset", "concerns the arms, of which none is registered"),
+            ("camera_registration", "concerns the depth camera, which is not registered"),
+        ],
+    )
+    def test_what_it_concerns_is_not_registered(self, scene: Scene, effect: str, says: str) -> None:
+        extended = scene.extended({effect: {"x_m": 0.002}})
+        with pytest.raises(NothingToAdopt, match=says):
+            adopted(Registration(measured=NOW, scene="demo"), extended, NOW)
+
 
 class TestCommand:
     """defras dvrk register."""
@@ -210,10 +223,38 @@ class TestCommand:
         write_registration(old, file)
         points = setup_file.with_name("points.csv")
         write_landmarks(landmarks(scene), points)
-        self.register("psm1", "demo", "--setup", str(setup_file), "--points", str(points))
+        said = self.register("psm1", "demo", "--setup", str(setup_file), "--points", str(points))
         new = read_registration(file)
         assert new.scene == "demo"
         assert not new.cameras
+        assert "what it says (depth) does not hold for 'demo'" in said
+        kept = file.with_name("registration_20260301T093000.yaml")
+        assert str(kept) in said
+        assert read_registration(kept) == old
+
+    def test_a_diagnosis_of_another_scene_is_not_adopted(
+        self, scene: Scene, setup_file: Path
+    ) -> None:
+        file, found = setup_file.with_name("registration.yaml"), setup_file.with_name("found.yaml")
+        extended = scene.extended({"tool_offset": {"x_m": 0.002}, "stiffness": {"scale": 1.2}})
+        write_scene(extended.model_copy(update={"name": "demo_extended"}), found)
+        old = Registration(measured=NOW, scene="demo").with_arm("psm1", Placed.of(BASE), NOW)
+        arguments = ("--setup", str(setup_file), "--found", str(found))
+        write_registration(old, file)
+        with pytest.raises(UserError, match="was measured for the scene 'demo', not for 'sim1'"):
+            self.register("adopt", "sim1", *arguments)
+        assert read_registration(file) == old
+        other = old.model_copy(update={"scene": "sim1"})
+        write_registration(other, file)
+        with pytest.raises(UserError, match="is the scene 'demo_extended', not 'sim1_extended'"):
+            self.register("adopt", "sim1", *arguments)
+        assert read_registration(file) == other
+        write_registration(old, file)
+        self.register("adopt", "demo", *arguments)
+        assert read_registration(file).arms["psm1"].position_m[0] == pytest.approx(0.022)
+        rest = load_scene(found.with_name("found_registered.yaml"))
+        assert list(rest.model.extension) == ["stiffness"]
+        assert rest.name == "demo", "a run is allowed only of what was registered"
 
     @pytest.mark.parametrize(
         ("arguments", "says"),

@@ -31,18 +31,24 @@ def adopted(registration: Registration, scene: Scene, measured: datetime) -> Reg
     """``registration`` with what ``scene`` adopts of :data:`FOLDED`.
 
     Raises:
-        NothingToAdopt: it adopts none of them, or nothing is registered that they concern.
+        NothingToAdopt: it adopts none of them, or what one of them concerns is not registered.
     """
     extension: Extension = scene.model.extension
     found = [name for name in FOLDED if name in extension]
     if not found:
         raise NothingToAdopt(f"{scene.name} adopts neither {' nor '.join(FOLDED)}")
+    if "tool_offset" in extension and not registration.arms:
+        raise NothingToAdopt("its tool_offset concerns the arms, of which none is registered")
+    if "camera_registration" in extension and "depth" not in registration.cameras:
+        raise NothingToAdopt(
+            "its camera_registration concerns the depth camera, which is not registered"
+        )
     if "tool_offset" in extension:
         true_from_believed = _tool_offset(extension["tool_offset"])
         for name, placed in registration.arms.items():
             moved = Placed.of(true_from_believed @ placed.pose)
             registration = registration.with_arm(name, moved, measured)
-    if "camera_registration" in extension and "depth" in registration.cameras:
+    if "camera_registration" in extension:
         effect = library.effect("camera_registration")
         assert isinstance(effect, CameraEffect)
         reported = effect.placement(extension["camera_registration"], scene.depth_camera)
