@@ -160,6 +160,23 @@ class TestAdopting:
             layer.reported(new.apply(seen_m)), camera.apply(seen_m), atol=1e-9
         )
 
+    def test_nothing_is_adopted_twice(self, scene: Scene, tmp_path: Path) -> None:
+        extended = scene.extended({"tool_offset": {"x_m": 0.004}})
+        measured = Placed.of(BASE).model_copy(update={"landmarks": 5, "rms_m": 0.0004})
+        registration = Registration(measured=NOW, scene=scene.name)
+        registration = adopted(registration.with_arm("psm1", measured, NOW), extended, NOW)
+        placed = registration.arms["psm1"]
+        assert placed.position_m[0] == pytest.approx(BASE.position_m[0] + 0.004)
+        assert (placed.landmarks, placed.rms_m) == (5, 0.0004), "it was not entered by hand"
+        write_registration(registration, tmp_path / "registration.yaml")
+        known = read_registration(tmp_path / "registration.yaml")
+        assert known == registration
+        with pytest.raises(NothingToAdopt, match="tool_offset was adopted already"):
+            adopted(known, extended, NOW)
+        later = scene.extended({"tool_offset": {"x_m": -0.001}})
+        again = adopted(known, later, NOW).arms["psm1"]
+        assert again.position_m[0] == pytest.approx(BASE.position_m[0] + 0.003)
+
     def test_the_scene_keeps_the_rest(self, scene: Scene) -> None:
         extended = scene.extended({"tool_offset": {"x_m": 0.001}, "stiffness": {"factor": 1.2}})
         assert list(without_adopted(extended).model.extension) == ["stiffness"]

@@ -12,7 +12,7 @@ from datetime import datetime
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from defras_bt.dvrk.registering.registration import Placed, Registration
+from defras_bt.dvrk.registering.registration import Registration
 from defras_sim.effects import library
 from defras_sim.effects.camera_effect import CameraEffect
 from defras_sim.effects.effect import Extension, Values
@@ -24,19 +24,26 @@ FOLDED = ("tool_offset", "camera_registration")
 
 
 class NothingToAdopt(ValueError):
-    """A scene adopts no effect that concerns the registration."""
+    """A scene adopts no effect that concerns the registration, or one that it has already."""
 
 
 def adopted(registration: Registration, scene: Scene, measured: datetime) -> Registration:
     """``registration`` with what ``scene`` adopts of :data:`FOLDED`.
 
     Raises:
-        NothingToAdopt: it adopts none of them, or what one of them concerns is not registered.
+        NothingToAdopt: it adopts none of them, what one of them concerns is not registered, or
+            the very same was adopted before.
     """
     extension: Extension = scene.model.extension
     found = [name for name in FOLDED if name in extension]
     if not found:
         raise NothingToAdopt(f"{scene.name} adopts neither {' nor '.join(FOLDED)}")
+    for name in found:
+        if dict(extension[name]) in registration.adopted.get(name, ()):
+            raise NothingToAdopt(
+                f"its {name} was adopted already: the registration stands where it says. What is "
+                "wrong since, a new recording and defras diagnose tell"
+            )
     if "tool_offset" in extension and not registration.arms:
         raise NothingToAdopt("its tool_offset concerns the arms, of which none is registered")
     if "camera_registration" in extension and "depth" not in registration.cameras:
@@ -46,14 +53,17 @@ def adopted(registration: Registration, scene: Scene, measured: datetime) -> Reg
     if "tool_offset" in extension:
         true_from_believed = _tool_offset(extension["tool_offset"])
         for name, placed in registration.arms.items():
-            moved = Placed.of(true_from_believed @ placed.pose)
+            moved = placed.moved_to(true_from_believed @ placed.pose)
             registration = registration.with_arm(name, moved, measured)
     if "camera_registration" in extension:
         effect = library.effect("camera_registration")
         assert isinstance(effect, CameraEffect)
         reported = effect.placement(extension["camera_registration"], scene.depth_camera)
-        moved = Placed.of(reported.inverse() @ registration.cameras["depth"].pose)
+        depth = registration.cameras["depth"]
+        moved = depth.moved_to(reported.inverse() @ depth.pose)
         registration = registration.with_camera("depth", moved, measured)
+    for name in found:
+        registration = registration.with_adopted(name, extension[name])
     return registration
 
 

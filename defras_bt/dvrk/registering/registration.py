@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
 from io import StringIO
 from pathlib import Path
@@ -25,7 +26,10 @@ _ROUNDING = 1e-3
 
 
 class Placed(Part):
-    """A frame in the tissue frame: its origin (m) and its rotation as a quaternion x, y, z, w."""
+    """A frame in the tissue frame: its origin (m) and its rotation as a quaternion x, y, z, w.
+
+    ``landmarks`` and what they are off by are of the fit that it was measured by.
+    """
 
     position_m: tuple[Metres, Metres, Metres]
     quaternion_xyzw: tuple[float, float, float, float]
@@ -49,6 +53,16 @@ class Placed(Part):
         turn = Rotation.from_quat(self.quaternion_xyzw).as_matrix()
         return Pose(np.array(self.position_m), turn)
 
+    def moved_to(self, pose: Pose) -> Placed:
+        """The same frame with another tissue_from_frame, measured as this one was."""
+        there = Placed.of(pose)
+        return self.model_copy(
+            update={
+                "position_m": there.position_m,
+                "quaternion_xyzw": there.quaternion_xyzw,
+            }
+        )
+
     @staticmethod
     def of(pose: Pose, fit: RigidFit | None = None) -> Placed:
         """The frame whose tissue_from_frame is ``pose``; ``fit`` is where it comes from."""
@@ -69,12 +83,15 @@ class Registration(Part):
     """tissue_from_base of each arm (the frame of its poses), tissue_from_camera of each camera.
 
     ``measured`` is when, ``scene`` for which patient; what moved since then is not registered.
+    ``adopted``: the values of effects, by their name, that a diagnosis found and that moved arms or
+    a camera since; they count from what was registered before, so never twice.
     """
 
     measured: datetime
     scene: str
     arms: dict[ArmName, Placed] = Field(default_factory=dict)
     cameras: dict[CameraName, Placed] = Field(default_factory=dict)
+    adopted: dict[str, tuple[dict[str, float], ...]] = Field(default_factory=dict)
 
     def with_arm(self, arm: ArmName, placed: Placed, measured: datetime) -> Registration:
         update = {"arms": {**self.arms, arm: placed}, "measured": measured}
@@ -83,6 +100,10 @@ class Registration(Part):
     def with_camera(self, camera: CameraName, placed: Placed, measured: datetime) -> Registration:
         update = {"cameras": {**self.cameras, camera: placed}, "measured": measured}
         return self.model_copy(update=update)
+
+    def with_adopted(self, effect: str, values: Mapping[str, float]) -> Registration:
+        told = {**self.adopted, effect: (*self.adopted.get(effect, ()), dict(values))}
+        return self.model_copy(update={"adopted": told})
 
 
 def read_registration(file: Path) -> Registration:
