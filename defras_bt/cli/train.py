@@ -116,7 +116,8 @@ def _train(
     resume: bool,
 ) -> None:
     from defras_bt.learning.data.shards import InvalidData
-    from defras_bt.learning.training.loop import OtherTraining, Settings
+    from defras_bt.learning.training.checkpoint import UnusableCheckpoint
+    from defras_bt.learning.training.loop import Settings
     from defras_bt.learning.training.run import train_network
 
     folder = out or Path(f"out/train-{name}")
@@ -133,7 +134,7 @@ def _train(
             resume=resume,
             tell=lambda sentence: console.print(sentence, markup=False),
         )
-    except (InvalidData, OtherTraining) as error:
+    except (InvalidData, UnusableCheckpoint) as error:
         raise UserError(str(error)) from error
     typer.echo(json.dumps({k: card["metrics"][k] for k in ("all", "belief alone")}, indent=2))
     typer.echo(f"Written to {folder}: {name}.safetensors, {name}.json")

@@ -24,7 +24,8 @@ from defras_bt.learning.data.shards import (
 )
 from defras_bt.learning.networks.propose import proposer
 from defras_bt.learning.networks.weights import NoWeights, read_weights
-from defras_bt.learning.training.loop import OtherTraining, Settings
+from defras_bt.learning.training.checkpoint import OtherTraining
+from defras_bt.learning.training.loop import Settings
 from defras_bt.learning.training.run import train_network
 from defras_sim.scene import Attachments, Roi, Scene, Simulation, Tissue
 

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from defras_bt.learning.networks.weights import NetworkName
 from defras_bt.learning.training.calibration import fitted_temperature, mean_probability
+from defras_bt.learning.training.checkpoint import Epoch
 from defras_bt.learning.training.encoding import About, Encoded, Part
-from defras_bt.learning.training.loop import Epoch, Settings, all_logits
+from defras_bt.learning.training.loop import Settings, all_logits
 from defras_bt.learning.training.metrics import overlap, prior, scores
 from defras_bt.learning.training.trainable import Trainable
 from defras_sim.geometry import Floats

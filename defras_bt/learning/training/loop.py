@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,9 +10,16 @@ from typing import Any
 
 import numpy as np
 import torch
-from safetensors.torch import load_file, save_file
 from torch import Tensor
 
+from defras_bt.learning.training.checkpoint import (
+    NAME,
+    Epoch,
+    described_data,
+    described_network,
+    read_checkpoint,
+    write_checkpoint,
+)
 from defras_bt.learning.training.encoding import Encoded, Part
 from defras_bt.learning.training.trainable import Trainable, batch, device_of
 from defras_sim.geometry import Floats
@@ -31,21 +36,6 @@ class Settings:
     weight_decay: float = 1e-2
     warm_up: float = 0.05
     patience: int = 8
-
-
-@dataclass(frozen=True)
-class Epoch:
-    """One line of the history. Losses in nats a hole."""
-
-    number: int
-    training_loss: float
-    validation_loss: float
-    best_loss: float
-    seconds: float
-
-
-class OtherTraining(ValueError):
-    """The checkpoint in a folder is of a training with other settings."""
 
 
 class Training:
@@ -67,10 +57,16 @@ class Training:
         """With ``resume`` it goes on from the checkpoint, if there is one.
 
         Raises:
-            OtherTraining: the checkpoint is of another training.
+            OtherTraining: the checkpoint is of other settings, another network or other data.
+            UnusableCheckpoint: it is cut, or something else.
         """
         self._folder, self._model, self._settings = folder, model, settings
         self._training, self._validation = parts["training"], parts["validation"]
+        self._identity = {
+            "settings": asdict(settings),
+            "network": described_network(model.network),
+            "data": described_data(parts),
+        }
         self.history: list[Epoch] = []
         named = list(model.network.named_parameters())
         self._names = [name for name, _ in named]
@@ -81,7 +77,7 @@ class Training:
         )
         self._best: dict[str, Tensor] = {}
         folder.mkdir(parents=True, exist_ok=True)
-        if resume and self._state_file.exists():
+        if resume and (folder / NAME).exists():
             self._resume()
 
     @property
@@ -138,41 +134,17 @@ class Training:
         for group in self._optimizer.param_groups:
             group["lr"] = s.rate * ramp * 0.5 * (1 + np.cos(np.pi * progress)) + 1e-6
 
-    @property
-    def _state_file(self) -> Path:
-        return self._folder / "checkpoint.json"
-
     def _save(self) -> None:
-        """Tensors as safetensors, numbers as JSON, each replaced in one step, the JSON last."""
         tensors = {f"now.{k}": v for k, v in self._model.network.state_dict().items()}
         tensors |= {f"best.{k}": v for k, v in self._best.items()}
         state = self._optimizer.state_dict()["state"]
         for index, name in enumerate(self._names):
             for key in ("step", "exp_avg", "exp_avg_sq"):
                 tensors[f"adam.{key}.{name}"] = state[index][key]
-        tensor_file = f"checkpoint-{len(self.history)}.safetensors"
-        content = {name: tensor.cpu().contiguous() for name, tensor in tensors.items()}
-        save_file(content, self._folder / tensor_file)
-        said = {
-            "settings": asdict(self._settings),
-            "tensors": tensor_file,
-            "history": [asdict(epoch) for epoch in self.history],
-        }
-        partial = self._state_file.with_suffix(".part")
-        partial.write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
-        os.replace(partial, self._state_file)
-        for old in self._folder.glob("checkpoint-*.safetensors"):
-            if old.name != tensor_file:
-                old.unlink()
+        write_checkpoint(self._folder, self._identity, tensors, self.history)
 
     def _resume(self) -> None:
-        content = json.loads(self._state_file.read_text(encoding="utf-8"))
-        if content["settings"] != asdict(self._settings):
-            raise OtherTraining(
-                f"{self._state_file} is of a training with {content['settings']}; asked for is "
-                f"{asdict(self._settings)}: start without --resume, or in another folder"
-            )
-        tensors = load_file(self._folder / content["tensors"])
+        tensors, history = read_checkpoint(self._folder, self._identity)
         self._model.network.load_state_dict(_under("now.", tensors))
         self._best = _under("best.", tensors)
         self._optimizer.load_state_dict(
@@ -187,7 +159,7 @@ class Training:
                 "param_groups": self._optimizer.state_dict()["param_groups"],
             }
         )
-        self.history = [Epoch(**epoch) for epoch in content["history"]]
+        self.history = history
 
 
 def head_weights(data: Encoded, heads: int, seed: int) -> Tensor:

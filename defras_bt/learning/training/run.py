@@ -34,7 +34,8 @@ def train_network(
 
     Raises:
         InvalidData: the folder holds too little data, none, or data that cannot be read.
-        OtherTraining: with ``resume``, the checkpoint in ``out`` is of another training.
+        UnusableCheckpoint: with ``resume``, the checkpoint in ``out`` is of another training, or
+            cannot be read.
     """
     torch.set_num_threads(threads)
     asked = read_manifest(data)
