@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from defras_bt.dvrk.ros_packages import ros_module
 from defras_bt.dvrk.settings import Ros1Transport
 from defras_bt.dvrk.stand_in.ros_master import RosMaster
+from defras_bt.dvrk.transport import ros1_node
 from defras_bt.dvrk.transport.crtk_messages import crtk_messages
 from defras_bt.dvrk.transport.lifeline import Lifeline
 from defras_bt.dvrk.transport.messages import JointMessage, PoseMessage, StateMessage
@@ -108,6 +109,30 @@ def test_who_else_commands(wire: Wire, ros_master: RosMaster) -> None:
     assert wire.transport.commanders("PSM9") == (), "not counting ourselves"
     assert not node_lives(ros_master.uri, "/nobody")
     assert node_lives(ros_master.uri, wire.rospy.get_name())
+
+
+@pytest.mark.parametrize(
+    ("error", "lives"),
+    [
+        (ConnectionRefusedError("refused"), False),
+        (socket.gaierror("Name or service not known"), True),
+        (TimeoutError("timed out"), True),
+    ],
+)
+def test_only_a_refusal_proves_that_a_node_is_dead(
+    error: OSError, lives: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Master:
+        def lookupNode(self, caller: str, node: str) -> tuple[int, str, str]:
+            return 1, "", "http://console:40000"
+
+    def unreachable(where: tuple[str, int], timeout_s: float) -> socket.socket:
+        assert where == ("console", 40000)
+        raise error
+
+    monkeypatch.setattr(ros1_node, "ServerProxy", lambda uri: Master())
+    monkeypatch.setattr("socket.create_connection", unreachable)
+    assert node_lives("http://robot:11311", "/teleop") is lives
 
 
 def test_a_living_master_is_not_lost(wire: Wire) -> None:

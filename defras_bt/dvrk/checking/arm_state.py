@@ -47,7 +47,10 @@ class CommandersCheck:
                 findings.append(skipped("commanders", arm.name, what))
             elif others:
                 what = f"is also commanded by {', '.join(others)}"
-                todo = "End that program: only one may command an arm."
+                todo = (
+                    "End that program: only one may command an arm. If it was killed, rosnode "
+                    "cleanup makes the master forget it."
+                )
                 findings.append(wrong("commanders", arm.name, what, todo))
             else:
                 findings.append(ok("commanders", arm.name, "nobody else commands it"))

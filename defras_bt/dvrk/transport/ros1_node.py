@@ -64,14 +64,20 @@ def require_master(uri: str) -> None:
 
 
 def node_lives(uri: str, node: str) -> bool:
-    """Whether a node of the master at ``uri`` answers."""
+    """Whether a node of the master at ``uri`` answers, or may live for all that is known here.
+
+    Only a master that does not know it, or a computer that refuses the connection, tells that it is
+    dead. A name that cannot be resolved or a time-out are of this computer's network.
+    """
     try:
         found: Any = ServerProxy(uri).lookupNode("/defras", node)
         if found[0] != 1:
             return False
         socket.create_connection(address(found[2]), _ANSWER_S).close()
-    except OSError:
+    except ConnectionRefusedError:
         return False
+    except OSError:
+        return True
     return True
 
 
