@@ -116,10 +116,15 @@ def _train(
     resume: bool,
 ) -> None:
     from defras_bt.learning.data.shards import InvalidData
+    from defras_bt.learning.networks.weights import built
     from defras_bt.learning.training.checkpoint import UnusableCheckpoint
     from defras_bt.learning.training.loop import Settings
     from defras_bt.learning.training.run import train_network
 
+    try:
+        built("banet" if name == "banet" else "sequence", config)
+    except ValueError as error:
+        raise UserError(f"--width: {error}") from error
     folder = out or Path(f"out/train-{name}")
     folder_for(folder)
     console = Console(stderr=True, soft_wrap=True, highlight=False)

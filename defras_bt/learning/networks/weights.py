@@ -28,6 +28,8 @@ SHIPPED = Path(__file__).parent.parent / "weights"
 
 FORMAT = "defras attachment network 1"
 
+WIDTH_STEP = 8
+
 
 @dataclass(frozen=True)
 class Trained:
@@ -39,7 +41,15 @@ class Trained:
 
 
 def built(name: NetworkName, config: Mapping[str, Any]) -> VoxelNetwork | SequenceNetwork:
-    """An untrained network; ``config`` are arguments of its class."""
+    """An untrained network; ``config`` are arguments of its class.
+
+    Raises:
+        ValueError: its width is not a multiple of :data:`WIDTH_STEP`, which its groups and heads
+            are made for.
+    """
+    width = config.get("width", WIDTH_STEP)
+    if width < WIDTH_STEP or width % WIDTH_STEP:
+        raise ValueError(f"width {width}: valid are multiples of {WIDTH_STEP}")
     return SequenceNetwork(**config) if name == "sequence" else VoxelNetwork(**config)
 
 
