@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from shutil import rmtree
 from threading import Event, Thread
 from time import monotonic, sleep, time
 
@@ -93,6 +94,8 @@ def trial(fault: DvrkFault, prepared: Preparation, folder: Path) -> DvrkVerdict:
             master.kill()
             running.close()
             fresh = running.enter_context(RosMaster(folder / "ros_again"))
+            # The new one is reached elsewhere, and a stand-in writes over no set-up.
+            rmtree(folder / _LAB)
             running.enter_context(_stand_in(fresh, folder))
         else:
             _wait_until_over(folder)

@@ -74,6 +74,8 @@ def topics(
     """
     require_folder(out)
     loaded = load_setup(setup)
+    if not loaded.registration.is_file():
+        raise UserError(f"{loaded.registration} does not exist: register arms and cameras first")
     registration = read_registration(loaded.registration)
     missing = [name for name in loaded.arms if name not in registration.arms]
     if missing:

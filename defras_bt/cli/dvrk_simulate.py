@@ -9,17 +9,26 @@ from types import FrameType
 from typing import Annotated, get_args
 
 import typer
+from pydantic import ValidationError
 from rich.console import Console
 
 from defras_bt.cli.errors import UserError
-from defras_bt.cli.files import find_scene
+from defras_bt.cli.files import find_scene, folder_for, require_folder
 from defras_bt.dvrk.ros_packages import RosMissing
+from defras_bt.dvrk.settings import Setup
 from defras_bt.dvrk.stand_in.faults import read_faults
 from defras_bt.dvrk.stand_in.imperfections import read_imperfections
 from defras_bt.dvrk.stand_in.order import Clock, StandInOrder, WorldName
-from defras_bt.dvrk.stand_in.set_up import registration_of, set_up_of, write_set_up
+from defras_bt.dvrk.stand_in.set_up import (
+    REGISTRATION_FILE,
+    SETUP_FILE,
+    registration_of,
+    set_up_of,
+    write_set_up,
+)
 from defras_bt.dvrk.stand_in.stand_in import StandIn
 from defras_bt.dvrk.transport.transport import ConnectionFailed
+from defras_sim.scene import Scene
 
 
 def simulate(
@@ -47,7 +56,9 @@ def simulate(
     ] = None,
     set_up: Annotated[
         Path | None,
-        typer.Option(help="Folder for the set-up and registration files that reach it."),
+        typer.Option(
+            help="Folder for the set-up and registration files that reach it; it may have none yet."
+        ),
     ] = None,
 ) -> None:
     """Stand in for a dVRK: two PSMs and their cameras over a real ROS 1 master.
@@ -78,15 +89,20 @@ def simulate(
         faults=read_faults(faults) if faults is not None else (),
         witness=witness,
     )
+    if witness is not None:
+        require_folder(witness, "--witness")
+    reached = _reached_at(order.master_uri, believed)
     if set_up is not None:
-        measured = datetime.now(UTC).replace(microsecond=0)
-        registration = registration_of(believed, order.imperfections, measured)
-        file = write_set_up(set_up, set_up_of(order.master_uri, believed), registration)
-        console.print(f"It is reached with --setup {file}", markup=False)
+        _require_free(set_up)
     try:
         stand_in = StandIn(order, lambda what: console.print(what, style="yellow", markup=False))
     except (ConnectionFailed, RosMissing) as error:
         raise UserError(str(error)) from error
+    if set_up is not None:
+        measured = datetime.now(UTC).replace(microsecond=0)
+        registration = registration_of(believed, order.imperfections, measured)
+        file = write_set_up(set_up, reached, registration)
+        console.print(f"It is reached with --setup {file}", markup=False)
 
     def end(_signal: int, _frame: FrameType | None) -> None:
         stand_in.stop()
@@ -99,3 +115,26 @@ def simulate(
         markup=False,
     )
     stand_in.run()
+
+
+def _reached_at(master_uri: str, scene: Scene) -> Setup:
+    """The set-up that reaches a stand-in at ``master_uri``."""
+    try:
+        return set_up_of(master_uri, scene)
+    except ValidationError as error:
+        why = "; ".join(fault["msg"] for fault in error.errors())
+        raise UserError(
+            f"--master {master_uri}: {why}; valid is what roscore prints as ROS_MASTER_URI, such "
+            "as http://localhost:11311"
+        ) from error
+
+
+def _require_free(folder: Path) -> None:
+    """See that nobody's set-up or registration would be written over in ``folder``."""
+    folder_for(folder, "--set-up")
+    taken = [name for name in (SETUP_FILE, REGISTRATION_FILE) if (folder / name).exists()]
+    if taken:
+        raise UserError(
+            f"--set-up {folder}: has a {' and a '.join(taken)} already, which may be a robot's; "
+            "give another folder, or leave --set-up out if they are this stand-in's"
+        )

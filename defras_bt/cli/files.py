@@ -27,7 +27,7 @@ def find(named: str, folder: str, suffix: str = ".yaml") -> Path:
     raise UserError(f"there is no file {named}; shipped with defras are: {names}")
 
 
-def folder_for(out: Path) -> Path:
+def folder_for(out: Path, option: str = "--out") -> Path:
     """Make the folder ``out`` where it is missing, and see that files can be written there.
 
     Raises:
@@ -38,7 +38,7 @@ def folder_for(out: Path) -> Path:
         with TemporaryFile(dir=out):
             return out
     except OSError as error:
-        raise UserError(f"--out {out}: {error}; give a folder that can be written to") from error
+        raise UserError(f"{option} {out}: {error}; give a folder that can be written to") from error
 
 
 def require_folder(file: Path, option: str = "--out") -> None:
@@ -51,7 +51,9 @@ def require_folder(file: Path, option: str = "--out") -> None:
     if not folder.exists():
         missing = next(p for p in (*reversed(folder.parents), folder) if not p.exists())
         raise UserError(f"{option} {file}: there is no folder {missing}; make it first")
-    folder_for(folder)
+    if file.is_dir():
+        raise UserError(f"{option} {file}: is a folder; give the name of a file to write")
+    folder_for(folder, option)
 
 
 def find_scene(named: str) -> tuple[Path, Scene]:

@@ -40,6 +40,16 @@ class Ros1Transport(Part):
     master_uri: Annotated[str, Field(pattern=r"^https?://[^/:]+:\d+/?$")] = "http://localhost:11311"
     own_address: str | None = None
 
+    @field_validator("master_uri")
+    @classmethod
+    def _has_a_port(cls, uri: str) -> str:
+        port = int(uri.rstrip("/").rpartition(":")[2])
+        if not 1 <= port <= 65535:
+            raise ValueError(
+                f"there is no port {port}; ports go from 1 to 65535, roscore's is 11311"
+            )
+        return uri
+
 
 class Ros2Transport(Part):
     """ROS 2 of the sourced environment."""
