@@ -36,16 +36,18 @@ from defras_bt.faults.file import read_faults
 from defras_bt.planning.preparation import needs_plan
 from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.composite import RecordingFailed
+from defras_bt.learning.networks.own_weights import OwnWeights
 from defras_bt.recording.decisions import DECISIONS_FILE, DecisionRecorder
 from defras_bt.recording.progress import EventPrinter, ProgressLine
 from defras_bt.recording.record import Recorder
 from defras_bt.recording.report import ReportRecorder
+from defras_bt.recording.run_file import STREAM_FILE
 from defras_bt.recording.summary import SummaryRecorder
 from defras_bt.recording.timeline import TimelineRecorder
 from defras_sim.scene import Scene
 
 LEFT = ("run.rrd", "recording.mcap", DECISIONS_FILE, "run.json", "report.html")
-"""The files that a run leaves in its folder."""
+"""The files that a run leaves in its folder; on a robot the log of its set-points as well."""
 
 
 def run(
@@ -75,6 +77,9 @@ def run(
     ] = None,
     faults: Annotated[
         str | None, typer.Option(help="Faults to inject: a file, or a shipped name.")
+    ] = None,
+    weights: Annotated[
+        Path | None, typer.Option(help="Folder of defras train; default: the shipped weights.")
     ] = None,
     approve: Annotated[
         bool, typer.Option("--approve", help="Show each plan and wait for the operator's approval.")
@@ -110,6 +115,7 @@ def run(
     _require_safe(tree_spec, tree)
     substitutes = NOTHING_SUBSTITUTED if substitute is None else read_substitutes(substitute)
     substituted = substitutes.paths(tree_spec)
+    own_weights = None if weights is None else OwnWeights.of(weights)
     injected = NO_FAULTS
     if faults is not None:
         injected = read_faults(find(faults, "sim/faults"), believed.arms)
@@ -136,6 +142,7 @@ def run(
         preoperative=prepared.plan,
         max_time_s=max_time,
         substitutes=substitutes,
+        weights=own_weights,
     )
     if substituted:
         console.print(
@@ -148,16 +155,18 @@ def run(
         console.print(
             f"A TRIAL, NOT AN OPERATION: faults are injected ({kinds}).", style="bold yellow"
         )
-    recorded = file_recorders(out) if out is not None else ()
-    recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console), *recorded]
     # A robot's time passes by itself; a simulated one must not race while a human thinks.
     desk = OperatorDesk(asks=approve, idle_s=believed.tick_s if laboratory is None else 0.0)
     interrupts = Interrupts(desk, last_deed=True)
-    operating = partial(operate, operation)
+    operating, of_robot = partial(operate, operation), list[Recorder]()
     if laboratory is not None:
         robot = connected(laboratory, believed, out)
-        recorders += told_to_ros(laboratory, robot)
+        of_robot = told_to_ros(laboratory, robot)
         operating = partial(operate_in, robot, operation, random_generators(seed)[1])
+    # Only now: what an earlier run left is not given up for a robot that does not answer.
+    recorded = file_recorders(out) if out is not None else []
+    recorders: list[Recorder] = [EventPrinter(console), ProgressLine(console)]
+    recorders += [*recorded, *of_robot]
     try:
         with at_the_desk(desk, console, out, asks=approve), interrupts.heeded():
             summary = operating(
@@ -176,7 +185,7 @@ def run(
         )
         raise typer.Exit(code_without_record(str(failed.summary.values["outcome"]))) from failed
     if out is not None:
-        console.print(f"Written to {out}: {', '.join(LEFT)}")
+        console.print(f"Written to {out}: {', '.join(_there(out))}")
     raise typer.Exit(OUTCOME_CODES[str(summary.values["outcome"])])
 
 
@@ -205,7 +214,7 @@ def file_recorders(out: Path) -> list[Recorder]:
         UserError: the folder cannot be made.
     """
     folder_for(out)
-    for name in LEFT:
+    for name in (*LEFT, STREAM_FILE):
         (out / name).unlink(missing_ok=True)
     timeline, bag, decisions, numbers, report = (out / name for name in LEFT)
     return [
@@ -225,12 +234,17 @@ def _require_unused(out: Path, *, replace: bool) -> None:
             ``replace`` gives up.
     """
     folder_for(out)
-    there = [name for name in LEFT if (out / name).exists()]
+    there = _there(out)
     if there and not replace:
         raise UserError(
             f"--out {out}: an earlier run left {', '.join(there)} there, which would be lost; give "
             "another folder, or --replace to give them up"
         )
+
+
+def _there(out: Path) -> list[str]:
+    """Which of the files that runs leave are in a folder."""
+    return [name for name in (*LEFT, STREAM_FILE) if (out / name).exists()]
 
 
 def _require_safe(tree: TreeSpec, named: str) -> None:

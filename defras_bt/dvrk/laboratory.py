@@ -11,10 +11,8 @@ from defras_bt.dvrk.settings import Ros1Transport, Setup
 from defras_bt.dvrk.streaming.servo_process import ServoProcess
 from defras_bt.dvrk.transport.ros1_node import join
 from defras_bt.dvrk.world import DvrkWorld
+from defras_bt.recording.run_file import STREAM_FILE
 from defras_sim.scene import Scene
-
-STREAM_FILE = "stream.csv"
-"""What a run's folder holds of every set-point: when it was sent, and when it was applied."""
 
 
 class NotRegistered(ValueError):

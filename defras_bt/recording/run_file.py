@@ -10,6 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 SCHEMA_FILE = Path(__file__).with_name("run.schema.json")
 
+STREAM_FILE = "stream.csv"
+"""Beside ``run.json`` of a run on a robot: every set-point, when it was sent, when applied."""
+
 Outcome = Literal["goal", "not_reached", "human", "error"]
 Count = Annotated[int, Field(ge=0)]
 Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]

@@ -14,7 +14,9 @@ import pytest
 
 from defras_bt.cli import plan as plan_command
 from defras_bt.cli import run as run_command
+from defras_bt.cli.errors import UserError
 from defras_bt.cli.main import main
+from defras_bt.recording.run_file import STREAM_FILE
 
 Defras = Callable[..., tuple[int, str, str]]
 
@@ -97,6 +99,30 @@ def test_what_an_earlier_run_left_can_be_given_up(defras: Defras, tmp_path: Path
     assert defras(*arguments)[0] == 2
     defras(*arguments, "--replace")
     assert all((out / name).read_bytes()[:3] != b"old" for name in run_command.LEFT)
+
+
+def test_nothing_is_given_up_for_a_robot_that_does_not_answer(
+    defras: Defras, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, out = quick_scene(tmp_path, "quick"), tmp_path / "out"
+    out.mkdir()
+    names = (*run_command.LEFT, STREAM_FILE)
+    for name in names:
+        (out / name).write_text("old")
+
+    def silent(*_: object) -> None:
+        raise UserError("--world dvrk: no ROS 1 master answers")
+
+    monkeypatch.setattr(run_command, "checked_laboratory", lambda _, believed: ("lab", believed))
+    monkeypatch.setattr(run_command, "connected", silent)
+    arguments = ("run", scene, "--tree", "fras", "--world", "dvrk", "--out", str(out))
+    code, _, err = defras(*arguments)
+    assert code == 2
+    assert "report.html, stream.csv there" in err.replace("\n", " ")
+    code, _, err = defras(*arguments, "--replace")
+    assert code == 2
+    assert "no ROS 1 master answers" in err
+    assert all((out / name).read_text() == "old" for name in names)
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"", b"[]", b'{"schema": "other"}'])

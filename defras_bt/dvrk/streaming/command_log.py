@@ -30,7 +30,8 @@ class _Line:
 
 class CommandLog:
     """Keeps lines until they are complete, and writes them to ``file`` when :meth:`write` is
-    called, outside the stream's own thread. Times are of the robot's clock.
+    called, outside the stream's own thread. Times are of the robot's clock. What ``file`` held is
+    replaced with the first line.
     """
 
     def __init__(self, file: Path | None = None) -> None:
@@ -40,9 +41,7 @@ class CommandLog:
         self._lock = Lock()
         self.took_up = Durations()
         """From sending to the echo, where it could be told."""
-        if file is not None:
-            with file.open("w", newline="", encoding="utf-8") as stream:
-                csv.writer(stream).writerow(COLUMNS)
+        self._begun = False
 
     def sent(self, arm: str, sent_s: float, pose: Pose) -> None:
         line = _Line(arm, sent_s, pose.position_m, pose.quaternion_xyzw)
@@ -72,8 +71,12 @@ class CommandLog:
                 ready.append(line)
         if self._file is None or not ready:
             return
-        with self._file.open("a", newline="", encoding="utf-8") as stream:
-            csv.writer(stream).writerows(_row(line) for line in ready)
+        with self._file.open("a" if self._begun else "w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream)
+            if not self._begun:
+                writer.writerow(COLUMNS)
+            writer.writerows(_row(line) for line in ready)
+        self._begun = True
 
 
 def _row(line: _Line) -> list[str]:
