@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -190,6 +191,11 @@ class Setup(Part):
         if len(set(names)) < len(names):
             raise ValueError(f"two arms cannot have the same name: {', '.join(names)}")
         return arms
+
+    def used_by(self, arms: Collection[ArmName]) -> Setup:
+        """This set-up without arms that are not among a scene's ``arms``: they are not touched."""
+        used = {name: arm for name, arm in self.arms.items() if name in arms}
+        return self.model_copy(update={"arms": used})
 
     @property
     def fingerprint(self) -> str:

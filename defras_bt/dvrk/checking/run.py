@@ -29,7 +29,7 @@ from defras_bt.dvrk.checking.watch import Watch
 from defras_bt.dvrk.checking.whole_cloud import WholeCloud
 from defras_bt.dvrk.checking.workspace import WorkspaceCheck
 from defras_bt.dvrk.crtk.arm import CrtkArm
-from defras_bt.dvrk.laboratory import open_cameras, registered
+from defras_bt.dvrk.laboratory import NotRegistered, open_cameras, registered
 from defras_bt.dvrk.settings import Setup
 from defras_bt.dvrk.streaming.servo_loop import StreamReport
 from defras_bt.dvrk.streaming.servo_process import ServoLost, ServoProcess
@@ -70,10 +70,17 @@ def check_bench(
     ``listening`` is called when everybody has answered.
 
     Raises:
-        NotRegistered: arms or cameras are not registered.
+        NotRegistered: arms or cameras are not registered, or the set-up lacks an arm of ``scene``.
         RosMissing: ROS is not installed.
         ConnectionFailed: somebody does not answer.
     """
+    missing = [name for name in scene.arms if name not in setup.arms]
+    if missing:
+        raise NotRegistered(
+            f"the set-up has no {' and no '.join(missing)}, which the scene {scene.name!r} uses; "
+            "add it under arms:"
+        )
+    setup = setup.used_by(scene.arms)
     registration = registered(setup, scene)
     cameras = open_cameras(setup, registration, scene)
     try:
