@@ -17,6 +17,7 @@ from defras_bt.executive.substitution import Substitute, Substitutes
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.faults.faults import KINDS, Faults
 from defras_bt.faults.system import PlannerTimesOut, TwinDiverges
+from defras_bt.learning.networks.own_weights import OwnWeights
 from defras_bt.planning.plan import Plan
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ def again_values(operation: Operation, faults: Faults) -> Mapping[str, Any]:
     return {
         "tree": tree_files(operation.tree_file),
         "max_time_s": operation.max_time_s,
+        "weights": None if operation.weights is None else operation.weights.values(),
         "preoperative": _PLAN.dump_python(operation.preoperative, mode="json"),
         "substitutes": [
             entry.model_dump(mode="json", exclude_unset=True)
@@ -50,6 +52,17 @@ def again_values(operation: Operation, faults: Faults) -> Mapping[str, Any]:
 def recorded_plan(again: Mapping[str, Any]) -> Plan | None:
     """The plan that was made before the operation."""
     return _PLAN.validate_python(again["preoperative"])
+
+
+def recorded_weights(again: Mapping[str, Any]) -> OwnWeights | None:
+    """The weights that were used in place of the shipped ones; None if those were.
+
+    Raises:
+        NoWeights: they are not where they were, or others are.
+    """
+    # Recordings from before there was a choice do not say.
+    values = again.get("weights")
+    return None if values is None else OwnWeights.recorded(values)
 
 
 def recorded_substitutes(again: Mapping[str, Any], file: Path) -> Substitutes:

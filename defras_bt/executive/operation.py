@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -21,6 +22,7 @@ from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, Substitutes
 from defras_bt.faults.faults import NO_FAULTS, FaultInjection, Faults
 from defras_bt.learning.buffer import KeyframeBuffer
 from defras_bt.learning.chain.estimators import estimator
+from defras_bt.learning.networks.own_weights import OwnWeights
 from defras_bt.learning.probe.choice import ProbeChooser
 from defras_bt.monitoring.warning import WarningMonitor
 from defras_bt.planning.plan import Plan
@@ -45,7 +47,8 @@ class Operation:
     """What to run. ``scene`` is believed, ``actual`` is there, None where nobody knows it; the
     files are for the record.
 
-    ``substitutes`` replace nodes of the tree, for trials in simulated worlds.
+    ``substitutes`` replace nodes of the tree, for trials in simulated worlds. ``weights`` of
+    networks stand in for the shipped ones.
     """
 
     scene: Scene
@@ -59,6 +62,7 @@ class Operation:
     preoperative: Plan | None = None
     max_time_s: float = 300.0
     substitutes: Substitutes = NOTHING_SUBSTITUTED
+    weights: OwnWeights | None = None
 
 
 class TwinRehearsal:
@@ -145,7 +149,7 @@ def operate_in(
             twin=twin,
             monitor=monitor,
             planner=injected.planner(believed),
-            estimator=estimator,
+            estimator=partial(estimator, own=operation.weights),
             mismatch=MismatchRanking(),
             keyframes=keyframes,
             rehearse=TwinRehearsal(),

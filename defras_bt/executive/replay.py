@@ -15,6 +15,7 @@ from defras_bt.executive.again import (
     recorded_faults,
     recorded_plan,
     recorded_substitutes,
+    recorded_weights,
     unpack_tree,
 )
 from defras_bt.executive.executive import ExecutiveFailed
@@ -169,6 +170,7 @@ def replay(
         NoInputs: the recording does not say what the executive was told.
         InvalidDecisions: it does not say what was decided.
         InvalidFile: the tree cannot be used.
+        NoWeights: the weights of its own that it was recorded with are not there any more.
         ExecutiveFailed: the replay broke.
     """
     inputs, decisions = read_inputs(run), read_decisions(run)
@@ -210,6 +212,7 @@ def _replay(
         preoperative=recorded_plan(again),
         max_time_s=again["max_time_s"],
         substitutes=recorded_substitutes(again, inputs.file),
+        weights=recorded_weights(again),
     )
 
     try:

@@ -7,14 +7,15 @@ from typing import Literal
 
 from defras_bt.learning.estimate import AttachmentEstimator
 from defras_bt.learning.inverse import InverseEstimator
+from defras_bt.learning.networks.own_weights import OwnWeights
 
 EstimatorName = Literal["inverse", "banet", "sequence", "chain"]
 ESTIMATORS: tuple[EstimatorName, ...] = ("inverse", "banet", "sequence", "chain")
 
 
 @cache
-def estimator(name: EstimatorName) -> AttachmentEstimator:
-    """The estimator called ``name``, with the shipped weights if it needs any.
+def estimator(name: EstimatorName, own: OwnWeights | None = None) -> AttachmentEstimator:
+    """The estimator called ``name``, with the shipped weights if it needs any, or with ``own``.
 
     torch is loaded only where a network is asked for.
 
@@ -26,8 +27,9 @@ def estimator(name: EstimatorName) -> AttachmentEstimator:
     from defras_bt.learning.chain.chain import ChainEstimator
     from defras_bt.learning.networks.estimator import NetworkEstimator
     from defras_bt.learning.networks.propose import proposer
-    from defras_bt.learning.networks.weights import read_weights
+    from defras_bt.learning.networks.weights import SHIPPED, read_weights
 
+    folder = SHIPPED if own is None else own.folder
     if name == "chain":
-        return ChainEstimator((proposer(read_weights("sequence")),))
-    return NetworkEstimator(proposer(read_weights(name)))
+        return ChainEstimator((proposer(read_weights("sequence", folder)),))
+    return NetworkEstimator(proposer(read_weights(name, folder)))
