@@ -8,7 +8,7 @@ from defras_bt.dvrk.settings import ArmSetup
 from defras_bt.dvrk.streaming.drive import ArmSnapshot
 from defras_bt.dvrk.world_clock import WorldClock
 from defras_sim.geometry import Pose
-from defras_sim.worlds.protocol import ArmObservation
+from defras_sim.worlds.protocol import JAW_CLOSED_RAD, ArmObservation
 
 
 class ArmReader:
@@ -18,8 +18,14 @@ class ArmReader:
         """``senses_force``: whether the scene counts on a force sensor; what an arm makes of its
         motors' currents is too rough to be taken for one."""
         self.frames = ArmFrames.of(setup, tissue_from_base)
+        self._closed_rad = setup.closed_rad
         self._grip = JawGrip(setup.closed_rad, setup.holds_above_rad)
         self._senses_force = senses_force
+
+    def jaw_goal_rad(self, wanted_rad: float | None) -> float | None:
+        """Where the jaw is sent for an opening of ``wanted_rad``; closed is as the set-up says."""
+        closes = wanted_rad is not None and wanted_rad <= JAW_CLOSED_RAD
+        return self._closed_rad if closes else wanted_rad
 
     def read(self, seen: ArmSnapshot, clock: WorldClock) -> ArmObservation:
         """The observation, stamped as its poses are. Older ones of its messages the stream has

@@ -97,7 +97,7 @@ class DvrkWorld:
         motions = {
             name: ArmMotion(
                 self._readers[name].frames.velocity(arm.linear_m_s, arm.angular_rad_s),
-                arm.jaw_rad,
+                self._readers[name].jaw_goal_rad(arm.jaw_rad),
             )
             for name, arm in command.arms.items()
         }

@@ -302,7 +302,7 @@ def test_nothing_is_sent_before_the_first_motion() -> None:
     assert driven.transport.jaws == []
 
 
-def test_a_jaw_goes_at_its_speed_and_grips_as_the_set_up_says() -> None:
+def test_a_jaw_goes_at_its_speed() -> None:
     driven = DrivenArm()
     driven.tick(jaw_rad=0.8)
     driven.period()

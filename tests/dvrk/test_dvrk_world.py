@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from defras_bt.dvrk.camera_source import CameraReadings
+from defras_bt.dvrk.camera_source import CameraReadings, NoCameras
 from defras_bt.dvrk.streaming.drive import ArmSnapshot
 from defras_bt.dvrk.streaming.periods import Durations
 from defras_bt.dvrk.streaming.servo_loop import Snapshot, StreamReport, Tick
@@ -160,6 +160,16 @@ def test_commands_are_turned_into_the_arms_frame(world: DvrkWorld, servo: ToySer
     assert motion.jaw_rad == 0.4
     assert "psm2" not in tick.motions
     assert tick.stamps_s["psm1"] == pytest.approx(servo.now_s - 0.002)
+
+
+@pytest.mark.parametrize(("wanted_rad", "sent_rad"), [(0.0, -0.2), (0.3, 0.3), (None, None)])
+def test_a_jaw_grips_as_far_as_the_set_up_says(
+    servo: ToyServo, wanted_rad: float | None, sent_rad: float | None
+) -> None:
+    arms = {n: a.model_copy(update={"closed_rad": -0.2}) for n, a in toy_setup().arms.items()}
+    world = DvrkWorld(toy_setup(arms=arms), SCENE, BASES, servo, NoCameras())
+    world.command(Command({"psm1": ArmCommand(jaw_rad=wanted_rad)}))
+    assert servo.ticks[-1].motions["psm1"].jaw_rad == sent_rad
 
 
 def test_a_command_that_nobody_can_carry_out(world: DvrkWorld) -> None:

@@ -29,8 +29,8 @@ _AFTERWARDS_S = 0.5
 
 @dataclass(frozen=True)
 class ArmMotion:
-    """What one arm does in the coming tick: the tip's velocity, and where the jaw goes (None:
-    nowhere)."""
+    """What one arm does in the coming tick: the tip's velocity, and where the jaw goes, as its
+    driver counts (None: nowhere)."""
 
     velocity: TipVelocity = field(default_factory=TipVelocity)
     jaw_rad: float | None = None
@@ -175,7 +175,7 @@ class ArmDrive:
             if start is None:
                 return
             self._jaw = JawStream(self._stream.jaw_rad_s, float(start.position[0]))
-        self._jaw.pursue(jaw_rad if jaw_rad > 0.0 else self.arm.setup.closed_rad)
+        self._jaw.pursue(jaw_rad)
 
     def _applied(self, sent_s: float, applied_s: float) -> None:
         self._log.applied(self.arm.name, sent_s, applied_s)
