@@ -81,10 +81,8 @@ def open_world(setup: Setup, scene: Scene, out: Path | None = None) -> DvrkWorld
         RosMissing: ROS is not installed.
         ConnectionFailed: somebody does not answer.
     """
+    setup = setup.used_by(scene.arms)
     registration = registered(setup, scene)
-    # An arm that the scene does not use is not touched.
-    used = {name: arm for name, arm in setup.arms.items() if name in scene.arms}
-    setup = setup.model_copy(update={"arms": used})
     cameras = open_cameras(setup, registration, scene)
     try:
         servo = ServoProcess(setup, None if out is None else out / STREAM_FILE)
