@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -132,6 +133,16 @@ def test_an_arm_that_stops_says_why() -> None:
     assert "PAUSED" in found.what
 
 
+@pytest.mark.parametrize("rests_rad", [-0.30, -0.05])
+def test_a_jaw_that_rests_beyond_closed(rests_rad: float) -> None:
+    def spoil(arm: ToyArm) -> None:
+        arm.jaw_setpoint_rad = rests_rad
+
+    servo, found = moved(spoil)
+    assert found[-1].what == "opened by 0.10 rad when told 0.1"
+    assert servo.arm.jaw_setpoint_rad == pytest.approx(rests_rad)
+
+
 def test_a_jaw_of_the_wrong_sign() -> None:
     def spoil(arm: ToyArm) -> None:
         messages = arm.messages
@@ -238,6 +249,23 @@ class TestRefusal:
         setup.checked.write_text('["passed"]')
         with pytest.raises(NotChecked, match="is no check's file"):
             require_checked(setup, scene, NOW)
+
+    @pytest.mark.parametrize(
+        ("content", "says"),
+        [
+            ({"checked": "2026-03-01T09:30:00"}, "checked: Input should have timezone info"),
+            ({"moved": None}, "moved: Input should be a valid boolean"),
+        ],
+    )
+    def test_a_check_that_was_changed(
+        self, setup: Setup, scene: Scene, content: dict[str, object], says: str
+    ) -> None:
+        self.write(setup, scene)
+        written = json.loads(setup.checked.read_text())
+        setup.checked.write_text(json.dumps(written | content))
+        with pytest.raises(NotChecked) as refused:
+            require_checked(setup, scene, NOW)
+        assert f"({says}): run defras dvrk check" in str(refused.value)
 
     def test_no_set_up_at_all(self, scene: Scene) -> None:
         with pytest.raises(UserError, match="--setup"):

@@ -8,6 +8,8 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Literal
 
+from pydantic import AwareDatetime, ValidationError
+
 from defras_bt.dvrk.checking.finding import Finding
 from defras_bt.dvrk.settings import Setup
 from defras_bt.planning.scene_hash import scene_hash
@@ -25,7 +27,7 @@ class CheckReport(Part):
     fingerprints of what was checked."""
 
     schema_name: Literal["defras/dvrk_check/1"] = "defras/dvrk_check/1"
-    checked: datetime
+    checked: AwareDatetime
     setup: str
     registration: str
     scene: str
@@ -66,6 +68,10 @@ def read_check(file: Path) -> CheckReport:
         return CheckReport.model_validate(content)
     except FileNotFoundError as error:
         raise NotChecked(f"{file} does not exist: run defras dvrk check first") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        why = f"{'.'.join(map(str, first['loc'])) or 'content'}: {first['msg']}"
+        raise NotChecked(f"{file} is no check's file ({why}): run defras dvrk check") from error
     except (OSError, ValueError) as error:
         raise NotChecked(f"{file} is no check's file ({error}): run defras dvrk check") from error
 
