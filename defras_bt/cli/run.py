@@ -33,10 +33,10 @@ from defras_bt.executive.tree_file import read_tree
 from defras_bt.executive.tree_spec import TreeSpec
 from defras_bt.faults.faults import NO_FAULTS, FaultInjection
 from defras_bt.faults.file import read_faults
+from defras_bt.learning.networks.own_weights import OwnWeights
 from defras_bt.planning.preparation import needs_plan
 from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.composite import RecordingFailed
-from defras_bt.learning.networks.own_weights import OwnWeights
 from defras_bt.recording.decisions import DECISIONS_FILE, DecisionRecorder
 from defras_bt.recording.progress import EventPrinter, ProgressLine
 from defras_bt.recording.record import Recorder

@@ -35,3 +35,9 @@ def test_an_empty_shard(defras: Defras, tmp_path: Path) -> None:
     code, _, err = defras("train", "banet", "--data", str(tmp_path), "--out", str(tmp_path / "o"))
     assert code == 2
     assert "00000.npz cannot be read as a shard" in err
+
+
+def test_a_run_with_weights_that_are_not_there(defras: Defras, tmp_path: Path) -> None:
+    code, _, err = defras("run", "demo", "--weights", str(tmp_path))
+    assert code == 2
+    assert f"{tmp_path} holds no weights" in err
