@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from typing import Annotated
@@ -62,13 +63,14 @@ def calibrate(
     Example: defras dvrk cameras calibrate camera.bag --tissue 160,120 --roi 88,140 -o out/cameras
     """
     colours = load_setup(setup).cameras.colours if setup is not None else Colours()
+    console = Console(soft_wrap=True, highlight=False)
+    leaving_out = partial(console.print, style="yellow", markup=False)
     try:
-        found = read_views(data, views)
+        found = read_views(data, views, leaving_out)
         colours = colours.model_copy(update=_fits(found, tissue or [], roi or []))
     except (NoCameraData, OutsidePicture) as error:
         raise UserError(str(error)) from error
     folder_for(out)
-    console = Console(soft_wrap=True, highlight=False)
     for number, view in enumerate(found, start=1):
         told = draw_view(view, colours, voxel, out / f"view_{number:02d}.png")
         console.print(told, markup=False)

@@ -185,8 +185,8 @@ def _tell(console: Console, setup: Setup, landmarks: list[Landmark], fit: RigidF
     )
     if fit.rms_m > limit_m or fit.worst_left_out_m > 2.0 * limit_m:
         console.print(
-            f"This is too much: {limit_m * 1e3:g} mm on average and {2e3 * limit_m:g} mm for a new "
-            "one are allowed, or the check will fail. Touch or see the worst ones again.",
+            f"This is too much: above {limit_m * 1e3:g} mm on average the check fails, above "
+            f"{2e3 * limit_m:g} mm for a new one it warns. Touch or see the worst ones again.",
             style="bold yellow",
         )
 

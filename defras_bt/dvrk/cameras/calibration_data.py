@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,21 +38,29 @@ class CameraView:
     rgb: NDArray[np.uint8] | None = None
 
 
-def read_views(data: Path, most: int = 4) -> list[CameraView]:
+def read_views(
+    data: Path, most: int = 4, tell: Callable[[str], object] = lambda why: None
+) -> list[CameraView]:
     """Up to ``most`` moments of each source, evenly over the time that ``data`` spans.
 
     ``data``: a bag (ROS 1, ROS 2, MCAP), an .npz of clouds (frames, points, 3), or an image.
+    ``tell`` takes a sentence for each topic or array that cannot be used beside those that can.
 
     Raises:
-        NoCameraData: it holds nothing of the kind.
+        NoCameraData: it cannot be read, or holds nothing of the kind.
     """
     if not data.exists():
         raise NoCameraData(f"{data} does not exist; give a bag, an .npz of clouds, or an image")
     if data.suffix.lower() in _IMAGES:
         return [_image(data)]
-    views = list(_arrays(data, most) if data.suffix == ".npz" else _bag(data, most))
+    left_out: list[str] = []
+    read = _arrays if data.suffix == ".npz" else _bag
+    views = list(read(data, most, left_out.append))
     if not views:
-        raise NoCameraData(f"{data} holds neither clouds nor pictures that can be read")
+        whys = "".join(f"; {why}" for why in left_out)
+        raise NoCameraData(f"{data} holds neither clouds nor pictures that can be read{whys}")
+    for why in left_out:
+        tell(why)
     return views
 
 
@@ -62,31 +72,42 @@ def _image(file: Path) -> CameraView:
     return CameraView(file.name, rgb=rgb)
 
 
-def _arrays(file: Path, most: int) -> Iterator[CameraView]:
-    with np.load(file) as arrays:
-        for name in arrays.files:
-            frames = np.asarray(arrays[name])
-            if frames.ndim == 2:
-                frames = frames[None]
-            if frames.ndim != 3 or frames.shape[-1] != 3 or frames.dtype.kind != "f":
-                continue
-            for index in spread(len(frames), most):
-                cloud = ColouredCloud(frames[index][None].astype(float), None)
-                yield CameraView(f"{name}, frame {index}", cloud)
+def _arrays(file: Path, most: int, tell: Callable[[str], object]) -> Iterator[CameraView]:
+    try:
+        with np.load(file) as arrays:
+            found = {name: np.asarray(arrays[name]) for name in arrays.files}
+    # numpy takes what is no archive for a pickle, which it does not load (ValueError), or gives a
+    # single array, which is no archive either (TypeError).
+    except (OSError, EOFError, ValueError, TypeError, BadZipFile, zlib.error) as error:
+        raise NoCameraData(f"{file} is no .npz of numbers: {error}") from error
+    for name, frames in found.items():
+        if frames.ndim == 2:
+            frames = frames[None]
+        if frames.ndim != 3 or frames.shape[-1] != 3 or frames.dtype.kind != "f":
+            continue
+        if not np.isfinite(frames).all(axis=-1).any():
+            tell(f"{name} is left out: it holds no measured point")
+            continue
+        for index in spread(len(frames), most):
+            cloud = ColouredCloud(frames[index][None].astype(float), None)
+            yield CameraView(f"{name}, frame {index}", cloud)
 
 
-def _bag(path: Path, most: int) -> Iterator[CameraView]:
+def _bag(path: Path, most: int, tell: Callable[[str], object]) -> Iterator[CameraView]:
     try:
         with AnyReader([path]) as reader:
             for topic, found in sorted(reader.topics.items()):
                 wanted = spread(found.msgcount, most)
-                if found.msgtype == _CLOUD:
-                    for index, message in _messages(reader, topic, wanted):
-                        yield CameraView(f"{topic}, message {index}", decode_cloud(message))
-                elif found.msgtype == _IMAGE:
-                    yield from _pictures(reader, topic, wanted)
-    except (AnyReaderError, Unusable) as error:
-        raise NoCameraData(f"{path}: {error}") from error
+                try:
+                    if found.msgtype == _CLOUD:
+                        for index, message in _messages(reader, topic, wanted):
+                            yield CameraView(f"{topic}, message {index}", decode_cloud(message))
+                    elif found.msgtype == _IMAGE:
+                        yield from _pictures(reader, topic, wanted)
+                except Unusable as error:
+                    tell(f"{topic} is left out: {error}")
+    except (AnyReaderError, OSError) as error:
+        raise NoCameraData(f"{path} is no bag that can be read: {error}") from error
 
 
 def _pictures(reader: AnyReader, topic: str, wanted: list[int]) -> Iterator[CameraView]:

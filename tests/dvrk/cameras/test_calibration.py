@@ -1,5 +1,6 @@
 """The calibration of cameras: data of every kind, and colours found from a few places."""
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,7 @@ def seen():
     return eye.take(RayCaster(surface), 0.0, np.random.default_rng(0))
 
 
-def camera_bag(file: Path, pictures: int = 3) -> Path:
+def camera_bag(file: Path, pictures: int = 3, colours: str = "rgb8") -> Path:
     """A ROS 1 bag of depth and colour pictures with their info."""
     image = seen()
     height, width = image.rgb.shape[:2]
@@ -58,7 +59,7 @@ def camera_bag(file: Path, pictures: int = 3) -> Path:
                     step=2 * width, data=np.frombuffer(raw_depth.tobytes(), np.uint8),
                 ),
                 "colour": kinds["Image"](
-                    header=at, height=height, width=width, encoding="rgb8", is_bigendian=0,
+                    header=at, height=height, width=width, encoding=colours, is_bigendian=0,
                     step=3 * width, data=image.rgb.reshape(-1),
                 ),
                 "info": kinds["CameraInfo"](
@@ -135,6 +136,46 @@ def test_clouds_in_arrays_are_read_frame_by_frame(tmp_path):
         read_views(file)
     with pytest.raises(NoCameraData, match="does not exist"):
         read_views(tmp_path / "nowhere.bag")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("junk.bag", b"junk"),
+        ("junk.npz", b"junk"),
+        ("empty.npz", b""),
+        ("cut.npz", b"PK\x03\x04junk"),
+        ("pickled.npz", pickle.dumps([1])),
+        ("folder", None),
+        ("folder.npz", None),
+    ],
+)
+def test_data_that_is_none_is_refused_in_one_line(tmp_path, name, content):
+    file = tmp_path / name
+    if content is None:
+        file.mkdir()
+    else:
+        file.write_bytes(content)
+    with pytest.raises(NoCameraData, match=rf"{name} is no (bag|\.npz)"):
+        read_views(file)
+
+
+def test_clouds_without_a_point_are_none(tmp_path):
+    file, told = tmp_path / "clouds.npz", []
+    np.savez(file, blind=np.full((2, 30, 3), np.nan))
+    with pytest.raises(NoCameraData, match="blind is left out: it holds no measured point"):
+        read_views(file)
+    np.savez(file, blind=np.full((2, 30, 3), np.nan), sheet=np.ones((1, 30, 3)))
+    assert [view.source for view in read_views(file, tell=told.append)] == ["sheet, frame 0"]
+    assert told == ["blind is left out: it holds no measured point"]
+
+
+def test_one_topic_that_cannot_be_used_leaves_the_others(tmp_path):
+    told = []
+    views = read_views(camera_bag(tmp_path / "c.bag", 2, "yuv422_yuy2"), 2, told.append)
+    assert {view.source.split(",")[0] for view in views} == {"/d/depth"}
+    assert len(told) == 1
+    assert "/d/colour is left out: a colour picture of encoding 'yuv422_yuy2'" in told[0]
 
 
 def test_the_command_leaves_pictures_and_settings(tmp_path):
