@@ -230,7 +230,7 @@ class TestCommand:
         points = setup_file.with_name("points.csv")
         write_landmarks(landmarks(scene, noise_m=0.004), points)
         said = self.register("psm1", "demo", "--setup", str(setup_file), "--points", str(points))
-        assert "This is too much: 2 mm on average and 4 mm for a new one are allowed" in said
+        assert "above 2 mm on average the check fails, above 4 mm for a new one it warns" in said
 
     def test_what_was_registered_for_another_scene_is_given_up(
         self, scene: Scene, setup_file: Path
