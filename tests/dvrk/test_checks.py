@@ -31,6 +31,7 @@ from defras_bt.dvrk.checking.tip import TipCheck
 from defras_bt.dvrk.checking.watch import Watch
 from defras_bt.dvrk.checking.workspace import WorkspaceCheck
 from defras_bt.dvrk.crtk.arm import CrtkArm
+from defras_bt.dvrk.laboratory import NotRegistered
 from defras_bt.dvrk.registering.registration import Placed, Registration
 from defras_bt.dvrk.settings import Limits, Setup
 from defras_bt.dvrk.streaming.servo_loop import Snapshot
@@ -428,3 +429,14 @@ def test_a_stream_that_is_lost_is_a_finding(lab: Lab, monkeypatch: pytest.Monkey
     told: list[Finding] = []
     assert run.run_motion(lab.bench(), told.append) == told
     assert "the process that drives the arms" in worst(told, "computer").what
+
+
+def test_without_a_registration_nobody_listens(lab: Lab, tmp_path: Path) -> None:
+    setup = lab.setup.model_copy(update={"registration": tmp_path / "none.yaml"})
+    said: list[str] = []
+    with (
+        pytest.raises(NotRegistered, match="register arms and cameras first"),
+        run.check_bench(setup, lab.scene, tmp_path, lambda: said.append("listening")),
+    ):
+        pass
+    assert said == []
