@@ -114,7 +114,7 @@ class ServoProcess:
         try:
             self._pipe.send(what)
         except OSError as error:
-            raise ServoLost(f"the process that drives the arms has ended ({error})") from error
+            raise self._ended() from error
 
     def _ask(self, question: Question, within_s: float = _ANSWER_S) -> Any:
         """The answer to ``question``, and to no other one: after a time-out the answer that was
@@ -134,7 +134,13 @@ class ServoProcess:
                 raise ServoLost(f"the process that drives the arms is silent for {within_s:g} s")
             return self._pipe.recv()
         except (EOFError, OSError) as error:
-            code = self._process.poll()
-            raise ServoLost(
-                f"the process that drives the arms has ended (exit code {code})"
-            ) from error
+            raise self._ended() from error
+
+    def _ended(self) -> ServoLost:
+        """Its end of the pipe is closed: it has ended, or is about to."""
+        try:
+            code = self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            code = self._process.wait()
+        return ServoLost(f"the process that drives the arms has ended (exit code {code})")
