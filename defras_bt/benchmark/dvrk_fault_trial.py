@@ -154,14 +154,16 @@ class _Trouble:
         self._thread.join()
 
     def _make(self) -> None:
-        moved = 0
+        moved, line = 0, ""
         with self._witness.open(encoding="utf-8") as told:
             while not self._over.is_set():
-                line = told.readline()
+                # A line may be met while it is being written.
+                line += told.readline()
                 if not line.endswith("\n"):
                     sleep(0.002)
                     continue
                 moved += len(moving([json.loads(line)]))
+                line = ""
                 if moved >= self._fault.after:
                     self._strike()
                     return

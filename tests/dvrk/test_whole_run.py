@@ -47,12 +47,13 @@ from defras_bt.dvrk.transport.ros1_node import join
 master, witness, topic = sys.argv[1:]
 rospy, string = join(Ros1Transport(master_uri=master), "trouble"), ros_module("std_msgs.msg").String
 orders = rospy.Publisher(topic, string, queue_size=10)
-moved, told = 0, open(witness)
+moved, told, line = 0, open(witness), ""
 told.seek(0, 2)
 while moved < 20:
-    line = told.readline()
+    line += told.readline()
     if line.endswith("\\n"):
         moved += len(moving([json.loads(line)]))
+        line = ""
     else:
         time.sleep(0.01)
 for arm in ("psm1", "psm2"):
