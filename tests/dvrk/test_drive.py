@@ -340,3 +340,18 @@ def test_every_set_point_is_logged_with_the_time_it_was_taken_up(driven: DrivenA
     # The toy takes a set-point up at once and tells so a period later.
     assert driven.log.took_up.quantile_s(0.99) == pytest.approx(PERIOD_S, abs=1e-3)
     assert driven.transport.sent[0][0] > BEGIN_S
+
+
+def test_an_arm_stands_still_while_another_one_must_not_be_driven(driven: DrivenArm) -> None:
+    transport, jaw_rad = driven.transport, driven.arm.jaw_setpoint_rad
+    count = len(transport.sent)
+    for _ in range(3):
+        transport.clock_s += PERIOD_S
+        transport.publish()
+        driven.drive.period(transport.clock_s, PERIOD_S, "", others_stopped=True)
+    held = [pose.position_m for _, _, pose in transport.sent[count - 1 :]]
+    assert len(held) == 4
+    assert np.ptp(held, axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert driven.arm.jaw_setpoint_rad == jaw_rad
+    driven.go(4)
+    assert driven.period()[1] > 0.0

@@ -202,3 +202,28 @@ class TestCommandLog:
             log.sent("PSM1", float(number), self.POSE)
         log.write(1000.0)
         assert not log._lines
+
+
+def test_where_one_arm_must_not_be_driven_the_other_stands_still(
+    transport: LiveTransport, tmp_path: Path
+) -> None:
+    loop = looping(transport, CommandLog(tmp_path / "stream.csv"))
+
+    def still(count: int) -> bool:
+        """Whether PSM1 was sent to one and the same place the last ``count`` times."""
+        places = [pose.position_m for _, arm, pose in list(transport.sent) if arm == "PSM1"]
+        return len(places) > count and not np.ptp(places[-count:], axis=0).any()
+
+    try:
+        loop.command(Tick({"psm1": ArmMotion(UP)}, 0.05))
+        wait_for(lambda: any(arm == "PSM1" for _, arm, _ in list(transport.sent)))
+        transport.arms["PSM2"].state = "PAUSED"
+
+        def tells_why() -> bool:
+            loop.command(Tick({"psm1": ArmMotion(UP)}, 0.05))
+            return "PAUSED" in loop.snapshot().arms["psm2"].stopped
+
+        wait_for(tells_why)
+        wait_for(lambda: still(5))
+    finally:
+        loop.close()

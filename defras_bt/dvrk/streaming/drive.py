@@ -95,8 +95,14 @@ class ArmDrive:
         if motion.jaw_rad is not None:
             self._pursue_jaw(motion.jaw_rad)
 
-    def period(self, now_s: float, elapsed_s: float, lost: str) -> bool:
-        """Send the next set-points, if any may be sent; returns whether any was."""
+    def period(
+        self, now_s: float, elapsed_s: float, lost: str, *, others_stopped: bool = False
+    ) -> bool:
+        """Send the next set-points, if any may be sent; returns whether any was.
+
+        ``others_stopped``: another arm of the set-up must not be driven now. Nobody can say what
+        that means for this one, so it stands still until somebody decides.
+        """
         setpoint = self.arm.setpoint_cp.message
         if setpoint is not None:
             self._echo.heard(setpoint.stamp_s, setpoint.pose)
@@ -106,8 +112,9 @@ class ArmDrive:
             return False
         if now_s > self._ends_s:
             self._stop_by_itself()
+        waits = others_stopped or bool(self.standing.wait)
         if self._tip is not None:
-            if self.standing.wait:
+            if waits:
                 self._tip.wait()
             else:
                 self._tip.step(elapsed_s)
@@ -115,7 +122,7 @@ class ArmDrive:
             self.arm.servo_cp(pose)
             self._echo.sent(now_s, pose)
             self._log.sent(self.arm.name, now_s, pose)
-        if self._jaw is not None and not self.standing.wait:
+        if self._jaw is not None and not waits:
             self.arm.servo_jaw(self._jaw.step(elapsed_s))
         return self.engaged
 

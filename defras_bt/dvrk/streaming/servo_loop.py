@@ -161,7 +161,11 @@ class ServoLoop:
             if tick is not None:
                 for name, drive in self._drives.items():
                     drive.command(tick.motions.get(name), tick.tick_s, now_s)
-            sent = [drive.period(now_s, elapsed_s, lost) for drive in self._drives.values()]
+            stopped = {name for name, drive in self._drives.items() if drive.standing.stopped}
+            sent = [
+                drive.period(now_s, elapsed_s, lost, others_stopped=bool(stopped - {name}))
+                for name, drive in self._drives.items()
+            ]
         if tick is not None and any(sent):
             for sensor, stamp_s in tick.stamps_s.items():
                 self._latencies.setdefault(sensor, Durations()).add(now_s - stamp_s)

@@ -28,6 +28,11 @@ class Standing:
     trip: str = ""
     wait: str = ""
 
+    @property
+    def stopped(self) -> bool:
+        """Whether there must be no motion now."""
+        return bool(self.trip or self.wait)
+
 
 class Supervisor:
     """Judges one arm once per period."""
