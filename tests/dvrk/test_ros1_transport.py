@@ -24,6 +24,9 @@ from defras_bt.dvrk.transport.ros1_node import address, join, node_lives
 from defras_bt.dvrk.transport.transport import ConnectionFailed
 from defras_sim.geometry import Pose
 
+# Several processes in real time: one that a busy machine starves is asked again.
+pytestmark = pytest.mark.flaky(reruns=2)
+
 POSE = Pose(np.array([0.01, -0.02, -0.12]), Rotation.from_rotvec([0.3, -0.2, 2.0]).as_matrix())
 
 
