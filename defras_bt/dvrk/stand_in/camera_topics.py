@@ -78,7 +78,6 @@ class CameraTopics:
         if depth_m is None:
             raise ValueError("the depth camera's picture has no depth")
         kinds = {fault.fault for fault in self._menu.there(CameraFault)}
-        self._witness.tell("picture", now_s, stamp_s=image.stamp_s, faults=sorted(kinds))
         frame = "map" if "wrong_frame" in kinds else DEPTH_FRAME
         depth = 1e3 * depth_m if "millimetres" in kinds else depth_m
         make, stamp_s = self._messages, start_s + image.stamp_s
@@ -93,6 +92,7 @@ class CameraTopics:
             # Large messages are not made for nobody.
             if self._out[topic].get_num_connections() > 0:
                 self._delivery.deliver("cloud", self._out[topic], made(), now_s)
+        self._witness.tell("picture", now_s, stamp_s=image.stamp_s, faults=sorted(kinds))
 
 
 def _shape(image: CameraImage) -> tuple[int, int]:
