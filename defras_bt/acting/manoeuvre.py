@@ -7,6 +7,7 @@ from py_trees.common import Status
 from defras_bt.acting.arm_action import ArmAction
 from defras_bt.executive.reasons import Code
 from defras_bt.executive.registry import register_node
+from defras_sim.geometry import Floats
 from defras_sim.motion import manoeuvre_target_m
 
 # After a manoeuvre the cameras need a moment to show where the tissue came to rest.
@@ -19,6 +20,7 @@ class Manoeuvre(ArmAction):
     def initialise(self) -> None:
         super().initialise()
         self._arrived_s: float | None = None
+        self._way_m: tuple[Floats, Floats] | None = None
 
     def update(self) -> Status:
         board = self.context.board
@@ -28,8 +30,9 @@ class Manoeuvre(ArmAction):
                 Code.NOT_HOLDING, f"{self.who} does not hold the tissue at {self.point}"
             )
         start_m = grip.starts_m.setdefault(self.spoken, self.setpoint_m.copy())
-        target_m = manoeuvre_target_m(self.context.scene, self.spoken, start_m)
-        if not self.go(target_m, self.context.scene.motion.tissue_speed_m_s):
+        if self._way_m is None or self._way_m[0] is not start_m:
+            self._way_m = (start_m, manoeuvre_target_m(self.context.scene, self.spoken, start_m))
+        if not self.go(self._way_m[1], self.context.scene.motion.tissue_speed_m_s):
             self._arrived_s = None
             return self.run(Code.MOVING, f"{self.who}: {self.spoken}, tissue held at {self.point}")
         now_s = board.inputs.time_s

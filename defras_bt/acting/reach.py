@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import dist
+
 import numpy as np
 from py_trees.common import Status
 
@@ -17,26 +19,29 @@ class Reach(ArmAction):
 
     spoken = "reach"
 
+    def initialise(self) -> None:
+        super().initialise()
+        scene = self.context.scene
+        self._goal_m = scene.grasp_point_m(*self.point)
+        self._clearance_m = float(scene.tissue.shape.high_m[2]) + scene.motion.clearance_m
+
     def update(self) -> Status:
-        board, scene = self.context.board, self.context.scene
+        board = self.context.board
         if self.arm in board.grips:
             return self.fail(Code.HOLDING, f"{self.who} holds tissue and cannot reach elsewhere")
-        speed = scene.motion.reach_speed_m_s
-        goal_m = scene.grasp_point_m(*self.point)
         board.at.pop(self.arm, None)
-        if self.go(self._waypoint_m(goal_m), speed) and np.allclose(
-            self.setpoint_m, goal_m, atol=ARRIVED_M
-        ):
+        waypoint_m = self._waypoint_m()
+        there = self.go(waypoint_m, self.context.scene.motion.reach_speed_m_s)
+        if there and waypoint_m is self._goal_m:
             board.at[self.arm] = self.point
             return self.finish(f"{self.who} has reached grasp point {self.point}.")
         return self.run(Code.MOVING, f"{self.who} is on its way to grasp point {self.point}")
 
-    def _waypoint_m(self, goal_m: Floats) -> Floats:
-        tip_m = self.setpoint_m
-        scene = self.context.scene
-        clearance_m = float(scene.tissue.shape.high_m[2]) + scene.motion.clearance_m
-        if np.linalg.norm(goal_m[:2] - tip_m[:2]) <= 2 * ARRIVED_M:
+    def _waypoint_m(self) -> Floats:
+        """The next corner (3,) of the way; the goal itself once the tip is over it."""
+        tip_m, goal_m = self.setpoint_m, self._goal_m
+        if dist(goal_m[:2].tolist(), tip_m[:2].tolist()) <= 2 * ARRIVED_M:
             return goal_m
-        if tip_m[2] < clearance_m - ARRIVED_M:
-            return np.array([*tip_m[:2], clearance_m])
-        return np.array([*goal_m[:2], max(clearance_m, tip_m[2])])
+        if tip_m[2] < self._clearance_m - ARRIVED_M:
+            return np.array([*tip_m[:2], self._clearance_m])
+        return np.array([*goal_m[:2], max(self._clearance_m, tip_m[2])])

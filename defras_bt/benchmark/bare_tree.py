@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import py_trees
 from py_trees import composites, decorators
@@ -15,17 +16,24 @@ from defras_bt.executive.loader import walk
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.executive.tree_kinds import KINDS
 from defras_bt.executive.tree_spec import NodeSpec
-from defras_bt.recording.record import TickRecord
+from defras_bt.planning.plan import Plan
+
+
+class Said(NamedTuple):
+    """What the nodes said in a tick, by path ("" where not ticked), and the plan in the tree."""
+
+    node_status: Mapping[str, str]
+    plan: Plan | None
 
 
 class BareTree:
-    """Ticks through ``records``; nobody listens, nothing is looked at.
+    """Ticks through what was ``said``; nobody listens, nothing is looked at.
 
     Each tick: :meth:`prepare`, :meth:`tick` (the one to measure), :meth:`check`.
     """
 
-    def __init__(self, tree_file: Path, records: Sequence[TickRecord]) -> None:
-        self._records: Iterator[TickRecord] = iter(records)
+    def __init__(self, tree_file: Path, said: Sequence[Said]) -> None:
+        self._said: Iterator[Said] = iter(said)
         root = bare(read_tree(tree_file).root, lambda spec: _Leaf(spec.name))
         self._bt = py_trees.trees.BehaviourTree(root)
         slots = [(node, path) for node, path in walk(root) if isinstance(node, PlanSlot)]
@@ -35,13 +43,13 @@ class BareTree:
         self._status: Mapping[str, str] = {}
 
     def prepare(self) -> None:
-        """Put the next record's plan into the tree and its words into the leaves."""
-        record = next(self._records)
-        self._status = record.node_status
-        if record.plan is not self._plan and self._slot is not None:
-            self._plan = record.plan
+        """Put the next tick's plan into the tree and its words into the leaves."""
+        now = next(self._said)
+        self._status = now.node_status
+        if now.plan is not self._plan and self._slot is not None:
+            self._plan = now.plan
             above = f"{self._slot_path}/"
-            names = [p.removeprefix(above) for p in record.node_status if p.startswith(above)]
+            names = [p.removeprefix(above) for p in now.node_status if p.startswith(above)]
             self._slot.fill([_Leaf(name) for name in names])
         for node, path in walk(self._bt.root):
             if isinstance(node, _Leaf):

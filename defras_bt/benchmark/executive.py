@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from defras_bt.benchmark.bare_tree import BareTree
+from defras_bt.benchmark.bare_tree import BareTree, Said
 from defras_bt.executive.context import Context
 from defras_bt.executive.executive import Executive
 from defras_bt.executive.perception import Perception
@@ -101,8 +101,8 @@ def _measured_once(tree_file: Path, scene: Scene, actions: int) -> Costs:
     plain = rig.run()
     with TemporaryDirectory() as folder:
         recorded = _Rig(tree_file, scene, actions, _recorders(Path(folder))).run()
-    bare, watch, spent_s = BareTree(tree_file, rig.records), Stopwatch(), []
-    for _ in rig.records:
+    bare, watch, spent_s = BareTree(tree_file, rig.said), Stopwatch(), []
+    for _ in rig.said:
         bare.prepare()
         with watch:
             bare.tick()
@@ -192,9 +192,9 @@ class _Rig:
         return {name: np.array(values) for name, values in spent_s.items()}
 
     @property
-    def records(self) -> list[TickRecord]:
-        """Every tick so far."""
-        return self._notes.records
+    def said(self) -> list[Said]:
+        """What the nodes said, tick by tick."""
+        return self._notes.said
 
 
 class _TimedWorld(BenchWorld):
@@ -296,15 +296,18 @@ class _TimedRecorder:
 
 
 class _Notes:
-    """Keeps the records, for the bare tree to say the same."""
+    """Keeps what the nodes said, for the bare tree to say the same.
+
+    Nothing else: an executive lets observations go, and the memory of a tick serves the next.
+    """
 
     def __init__(self) -> None:
-        self.records: list[TickRecord] = []
+        self.said: list[Said] = []
 
     def start(self, info: RunInfo) -> None: ...
 
     def tick(self, record: TickRecord) -> None:
-        self.records.append(record)
+        self.said.append(Said(record.node_status, record.plan))
 
     def finish(self, summary: RunSummary) -> None: ...
 

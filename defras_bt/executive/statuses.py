@@ -38,9 +38,13 @@ class TreeSnapshot:
 
 
 class _Word(NamedTuple):
-    """What one node said when it was ticked; ``leaf`` is the one that the words come from."""
+    """What one node said when it was ticked; ``leaf`` is the one that the words come from.
+
+    ``name`` is that of ``status``: to ask an enumeration for it takes longer than all else.
+    """
 
     status: Status
+    name: str
     code: str
     message: str
     decider: Behaviour | None
@@ -60,11 +64,18 @@ class _Words:
         self._take(ever)
 
     def snapshot(
-        self, now: Mapping[Behaviour, _Word], cause: Cause | None, stopped_by: Cause | None
+        self,
+        now: Mapping[Behaviour, _Word],
+        new: Mapping[Behaviour, _Word],
+        cause: Cause | None,
+        stopped_by: Cause | None,
     ) -> TreeSnapshot:
-        """What stands after a tick in which the nodes of ``now`` spoke."""
+        """What stands after a tick in which the nodes of ``now`` spoke, those of ``new`` anew."""
+        self._take(new)
+        paths = self.paths
+        spoken = {paths[node]: word.name for node, word in now.items() if node in paths}
         return TreeSnapshot(
-            status=self._silence | self._take(now),
+            status=self._silence | spoken,
             last_status=dict(self._last_status),
             code=dict(self._code),
             message=dict(self._message),
@@ -73,14 +84,12 @@ class _Words:
             stopped_by=stopped_by,
         )
 
-    def _take(self, words: Mapping[Behaviour, _Word]) -> dict[str, str]:
-        """Take note of words; returns the statuses in them by path."""
-        statuses: dict[str, str] = {}
-        for node, (status, code, message, decider, _) in words.items():
+    def _take(self, words: Mapping[Behaviour, _Word]) -> None:
+        for node, (_, name, code, message, decider, _) in words.items():
             path = self.paths.get(node)
             if path is None:
                 continue
-            statuses[path] = self._last_status[path] = status.name
+            self._last_status[path] = name
             self._code[path] = code
             self._message[path] = message
             by = self.paths.get(decider) if decider is not None else None
@@ -88,7 +97,6 @@ class _Words:
                 self._decider.pop(path, None)
             else:
                 self._decider[path] = by
-        return statuses
 
 
 class TickedVisitor(py_trees.visitors.VisitorBase):
@@ -104,16 +112,18 @@ class TickedVisitor(py_trees.visitors.VisitorBase):
         self._tree = tree
         self._carries_out = carries_out_plans(tree.plan_slot)
         self._now: dict[Behaviour, _Word] = {}
+        self._new: dict[Behaviour, _Word] = {}
         self._ever: dict[Behaviour, _Word] = {}
         self._plan: list[Behaviour] | None = None
         self._words = _Words({}, {})
 
     def initialise(self) -> None:
-        self._now = {}
+        self._now, self._new = {}, {}
 
     def run(self, behaviour: Behaviour) -> None:
-        word = self._word(behaviour)
-        self._now[behaviour] = self._ever[behaviour] = word
+        word = self._now[behaviour] = self._word(behaviour)
+        if word is not self._ever.get(behaviour):
+            self._new[behaviour] = self._ever[behaviour] = word
         if behaviour is self._carries_out and word.status == Status.FAILURE:
             self._board.failure = Cause(word.code, word.message)
 
@@ -131,19 +141,33 @@ class TickedVisitor(py_trees.visitors.VisitorBase):
         stopped = stop is not None and stop.status == Status.FAILURE
         return self._words.snapshot(
             self._now,
+            self._new,
             self._cause(self._now.get(self._tree.root)),
             self._cause(stop) if stopped else None,
         )
 
     def _word(self, behaviour: Behaviour) -> _Word:
+        """What a node just said; most often it says what it said before."""
         status = behaviour.status
         decider = deciding_child(behaviour, self._now) if behaviour.children else None
         if decider is not None:
             heard = self._now[decider]
-            return _Word(status, heard.code, heard.message, decider, heard.leaf)
-        # Only leaves and the plan slot have words of their own. Asking for their class is slow.
-        code = getattr(behaviour, "code", "")
-        return _Word(status, code, behaviour.feedback_message, None, behaviour)
+            code, message, leaf = heard.code, heard.message, heard.leaf
+        else:
+            # Only leaves and the plan slot have words of their own. Asking for their class is slow.
+            code, message = getattr(behaviour, "code", ""), behaviour.feedback_message
+            leaf = behaviour
+        before = self._ever.get(behaviour)
+        if (
+            before is not None
+            and before.status is status
+            and before.decider is decider
+            and before.leaf is leaf
+            and before.message == message
+            and before.code == code
+        ):
+            return before
+        return _Word(status, status.name, code, message, decider, leaf)
 
     def _cause(self, word: _Word | None) -> Cause | None:
         if word is None:

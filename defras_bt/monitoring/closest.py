@@ -63,9 +63,14 @@ def checked(points_m: Floats, corners_m: Floats) -> tuple[Floats, Floats]:
     corners = np.ascontiguousarray(corners_m, float).reshape(-1, 3, 3)
     if len(corners) == 0:
         raise ValueError("no triangles given: nothing is closest to a point")
-    if not (all_finite(points) and all_finite(corners.reshape(-1, 3))):
+    if not _both_finite(points, corners):
         raise ValueError("points and triangles should be finite; drop NaN points while sensing")
     return points, corners
+
+
+@jit
+def _both_finite(points: Floats, corners: Floats) -> bool:
+    return all_finite(points) and all_finite(corners.reshape(-1, 3))
 
 
 @jit

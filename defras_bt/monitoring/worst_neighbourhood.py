@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from defras_bt.monitoring.cells import extent_m, neighbour_ranges, sorted_into_cells
 from defras_bt.monitoring.closest import SortedTriangles, near, nearest_of_all, sorted_triangles
+from defras_bt.monitoring.triangles import bound
 from defras_sim.geometry import Floats
 from defras_sim.tissue.matrices import jit
 
@@ -30,7 +31,11 @@ def worst_median_m(
     known, guess = np.empty(len(order), np.bool_), 0
     for i in range(len(order)):
         p = (points_m[order[i], 0], points_m[order[i], 1], points_m[order[i], 2])
-        square, guess, known[i] = near(p, among, guess)
+        square, over = bound(p, among.planes, guess)
+        if over:
+            known[i] = False
+        else:
+            square, guess, known[i] = near(p, among, guess)
         value[i], triangle[i] = np.sqrt(square), guess
     buffer, ranges = np.empty((2, len(value))), np.empty((9, 2), np.int64)
     # Where the largest value is, a large median is likely: few others can compete with that.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping
 from math import dist, isfinite
+from typing import NamedTuple
 
 from defras_bt.sensing.dead_reckoning import STRAYED_M, DeadReckoning
-from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 from defras_sim.worlds.protocol import ArmObservation, Command, Observation
 
@@ -16,6 +16,22 @@ FOLLOWING_M = 0.003
 sixty times that of the arms in PyBullet at full speed."""
 JUMP_M = 0.002
 """A tip may be this much farther on than its speed explains: noise, and the roundness of stamps."""
+
+
+class _Place(NamedTuple):
+    """Where an arm's tip and its set-point were, in metres: of three numbers, arrays are slower."""
+
+    stamp_s: float
+    tip_m: list[float]
+    setpoint_m: list[float]
+
+    @property
+    def is_sound(self) -> bool:
+        return isfinite(self.stamp_s) and all(map(isfinite, self.tip_m + self.setpoint_m))
+
+    def moved_m(self, other: _Place) -> float:
+        """The larger way of tip and set-point between two readings."""
+        return max(dist(self.tip_m, other.tip_m), dist(self.setpoint_m, other.setpoint_m))
 
 
 class ArmPlausibility:
@@ -31,8 +47,8 @@ class ArmPlausibility:
 
     def __init__(self, scene: Scene) -> None:
         self._speed_m_s = scene.motion.reach_speed_m_s
-        self._last: dict[str, ArmObservation] = {}
-        self._lost: dict[str, ArmObservation] = {}
+        self._last: dict[str, _Place] = {}
+        self._lost: dict[str, _Place] = {}
         self._tick_s = scene.tick_s
         self._reckoned: defaultdict[str, DeadReckoning] = defaultdict(DeadReckoning)
 
@@ -45,15 +61,14 @@ class ArmPlausibility:
         """A sentence for each arm that must not be acted on; call it once per tick."""
         found: dict[str, str] = {}
         for name, arm in observation.arms.items():
-            if not _is_sound(arm):
+            place = _place(arm)
+            if not place.is_sound:
                 continue  # freshness says so already
-            jumped_m = 0.0 if driven_by_hand else self._jump_m(name, arm)
+            jumped_m = 0.0 if driven_by_hand else self._jump_m(name, place)
             if driven_by_hand:
                 self._lost.pop(name, None)
-            self._last[name] = arm
-            away_m = _distance_m(
-                arm.tissue_from_tip.position_m, arm.setpoint_tissue_from_tip.position_m
-            )
+            self._last[name] = place
+            away_m = dist(place.tip_m, place.setpoint_m)
             stopped = driven_by_hand or name in observation.stopped
             if stopped or away_m > FOLLOWING_M:
                 # A driver may take the set-point back to a tip that was held up.
@@ -80,10 +95,10 @@ class ArmPlausibility:
                 )
         return found
 
-    def _jump_m(self, name: str, arm: ArmObservation) -> float:
+    def _jump_m(self, name: str, now: _Place) -> float:
         """How far an arm is from where it was lost; 0 while it is not lost."""
         if name in self._lost:
-            away_m = _moved_m(self._lost[name], arm)
+            away_m = self._lost[name].moved_m(now)
             if away_m > JUMP_M:
                 return away_m
             del self._lost[name]
@@ -91,29 +106,14 @@ class ArmPlausibility:
         last = self._last.get(name)
         if last is None:
             return 0.0
-        most_m = JUMP_M + self._speed_m_s * max(0.0, arm.stamp_s - last.stamp_s)
-        moved_m = _moved_m(last, arm)
+        most_m = JUMP_M + self._speed_m_s * max(0.0, now.stamp_s - last.stamp_s)
+        moved_m = last.moved_m(now)
         if moved_m <= most_m:
             return 0.0
         self._lost[name] = last
         return moved_m
 
 
-def _is_sound(arm: ArmObservation) -> bool:
-    poses = (arm.tissue_from_tip, arm.setpoint_tissue_from_tip)
-    numbers = (number for pose in poses for number in pose.position_m.tolist())
-    return isfinite(arm.stamp_s) and all(map(isfinite, numbers))
-
-
-def _moved_m(one: ArmObservation, other: ArmObservation) -> float:
-    """The larger way of tip and set-point between two readings."""
-    return max(
-        _distance_m(one.tissue_from_tip.position_m, other.tissue_from_tip.position_m),
-        _distance_m(
-            one.setpoint_tissue_from_tip.position_m, other.setpoint_tissue_from_tip.position_m
-        ),
-    )
-
-
-def _distance_m(one: Floats, other: Floats) -> float:
-    return dist(one.tolist(), other.tolist())
+def _place(arm: ArmObservation) -> _Place:
+    tip, setpoint = arm.tissue_from_tip, arm.setpoint_tissue_from_tip
+    return _Place(arm.stamp_s, tip.position_m.tolist(), setpoint.position_m.tolist())

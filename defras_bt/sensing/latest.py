@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from math import isinf
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -44,15 +44,20 @@ class LatestReadings:
         share, stamp_s = self._newer_visibility(observation)
         cloud, depth = observation.cloud, observation.depth_image
         picture = observation.endoscope_image
-        return replace(
-            observation,
-            arms=arms,
-            cloud=None if cloud is None else self._newer("cloud", cloud, now_s),
-            depth_image=None if depth is None else self._newer("depth_image", depth, now_s),
-            endoscope_image=None if picture is None else self._newer("picture", picture, now_s),
-            roi_visibility=share,
-            roi_visibility_stamp_s=stamp_s,
-        )
+        newest: dict[str, Any] = {
+            "cloud": None if cloud is None else self._newer("cloud", cloud, now_s),
+            "depth_image": None if depth is None else self._newer("depth_image", depth, now_s),
+            "endoscope_image": None if picture is None else self._newer("picture", picture, now_s),
+            "roi_visibility": share,
+            "roi_visibility_stamp_s": stamp_s,
+        }
+        other: dict[str, Any] = {
+            what: new for what, new in newest.items() if getattr(observation, what) is not new
+        }
+        if any(arms[name] is not arm for name, arm in observation.arms.items()):
+            other["arms"] = arms
+        # Most often everything is new, and a copy of an observation takes its time.
+        return replace(observation, **other) if other else observation
 
     def _newer(self, name: str, reading: AnyReading, now_s: float) -> AnyReading:
         if isinf(age_s(reading.stamp_s, now_s)):

@@ -72,8 +72,10 @@ class FlatFace:
     height_m: float
 
     def at(self, xy_m: Floats) -> Floats:
-        inside = np.clip(xy_m, -self.half_m, self.half_m)
-        return np.concatenate([inside, np.full((*inside.shape[:-1], 1), self.height_m)], axis=-1)
+        points_m = np.empty((*np.shape(xy_m)[:-1], 3))
+        points_m[..., :2] = np.minimum(np.maximum(xy_m, -self.half_m), self.half_m)
+        points_m[..., 2] = self.height_m
+        return points_m
 
     def tangents(self, xy_m: Floats) -> Floats:
         return np.broadcast_to(np.eye(3)[:2], (*np.shape(xy_m)[:-1], 2, 3))

@@ -38,10 +38,15 @@ def joints_of(base_from_tip: Pose) -> Floats:
     Raises:
         Undetermined: the wrist's yaw axis points at the remote centre.
     """
-    joints, found = _joints(base_from_tip.rotation, base_from_tip.position_m)
+    return joints_at(base_from_tip.position_m, base_from_tip.rotation)
+
+
+def joints_at(position_m: Floats, rotation: Floats) -> Floats:
+    """As :func:`joints_of`, of a pose in two parts: of its position (3,) and rotation (3, 3)."""
+    joints, found = _joints(rotation, position_m)
     if not found:
         raise Undetermined(
-            f"at {np.round(base_from_tip.position_m, 4)} m from the remote centre the wrist's yaw "
+            f"at {np.round(position_m, 4)} m from the remote centre the wrist's yaw "
             "axis points at it; turn the tip"
         )
     return joints

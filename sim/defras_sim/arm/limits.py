@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defras_sim.arm.closed_form import Undetermined, joints_of, turned_back
+from defras_sim.arm.closed_form import Undetermined, joints_at, turned_back
 from defras_sim.arm.dh import (
     INSERTION,
     JOINT_HIGH,
@@ -63,7 +63,7 @@ class ArmLimits:
 
         try:
             start = self._joints(tip)
-            reason = _broken(start, end(1.0), time_s)
+            reason = _broken(start, self._joints(tip.moved(linear_m, angular_rad)), time_s)
             if not reason:
                 return AllowedMotion(1.0, "")
             low, high = 0.0, 1.0
@@ -78,7 +78,7 @@ class ArmLimits:
         return AllowedMotion(low, reason)
 
     def _joints(self, tissue_from_tip: Pose) -> Floats:
-        return joints_of(Pose(tissue_from_tip.position_m - self._rcm_m, tissue_from_tip.rotation))
+        return joints_at(tissue_from_tip.position_m - self._rcm_m, tissue_from_tip.rotation)
 
 
 def _broken(start: Floats, end: Floats, time_s: float) -> str:
