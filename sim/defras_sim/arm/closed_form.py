@@ -43,7 +43,7 @@ def joints_of(base_from_tip: Pose) -> Floats:
 
 def joints_at(position_m: Floats, rotation: Floats) -> Floats:
     """As :func:`joints_of`, of a pose in two parts: of its position (3,) and rotation (3, 3)."""
-    joints, found = _joints(rotation, position_m)
+    joints, found = joints_and_whether(rotation, position_m)
     if not found:
         raise Undetermined(
             f"at {np.round(position_m, 4)} m from the remote centre the wrist's yaw "
@@ -53,7 +53,7 @@ def joints_at(position_m: Floats, rotation: Floats) -> Floats:
 
 
 @jit
-def _joints(turn: Floats, position_m: Floats) -> tuple[Floats, bool]:
+def joints_and_whether(turn: Floats, position_m: Floats) -> tuple[Floats, bool]:
     """Joints (6,), and whether the wrist's pitch axis is determined."""
     approach = (turn[0, 2], turn[1, 2], turn[2, 2])
     yaw_axis = (-turn[0, 0], -turn[1, 0], -turn[2, 0])
@@ -81,6 +81,7 @@ def _joints(turn: Floats, position_m: Floats) -> tuple[Floats, bool]:
     return joints, True
 
 
+@jit
 def turned_back(angle_rad: float) -> float:
     """The same angle between -pi and pi."""
     return (angle_rad + pi) % (2 * pi) - pi

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from defras_sim.arm.broken_joint import NONE, UNDETERMINED, broken_joint
 from defras_sim.arm.closed_form import Undetermined, joints_at, turned_back
 from defras_sim.arm.dh import (
     INSERTION,
@@ -23,8 +24,6 @@ from defras_sim.geometry import Floats, Pose
 
 LOW = JOINT_LOW.copy()
 LOW[INSERTION] = SHAFT_BEYOND_RCM_M
-# Plain numbers: of six joints, arrays would be slower.
-_LOW, _HIGH, _SPEED = LOW.tolist(), JOINT_HIGH.tolist(), JOINT_SPEED.tolist()
 _ROLL = JOINT_NAMES.index("roll")
 _HALVINGS = 10
 
@@ -58,18 +57,14 @@ class ArmLimits:
             time_s: how long it takes.
         """
 
-        def end(share: float) -> Floats:
-            return self._joints(tip.moved(share * linear_m, share * angular_rad))
-
         try:
-            start = self._joints(tip)
-            reason = _broken(start, self._joints(tip.moved(linear_m, angular_rad)), time_s)
+            reason = self._broken(tip, linear_m, angular_rad, time_s)
             if not reason:
                 return AllowedMotion(1.0, "")
             low, high = 0.0, 1.0
             for _ in range(_HALVINGS):
                 middle = (low + high) / 2
-                if _broken(start, end(middle), time_s):
+                if self._broken(tip, middle * linear_m, middle * angular_rad, time_s):
                     high = middle
                 else:
                     low = middle
@@ -77,29 +72,26 @@ class ArmLimits:
             return AllowedMotion(0.0, str(error))
         return AllowedMotion(low, reason)
 
-    def _joints(self, tissue_from_tip: Pose) -> Floats:
-        return joints_at(tissue_from_tip.position_m - self._rcm_m, tissue_from_tip.rotation)
-
-
-def _broken(start: Floats, end: Floats, time_s: float) -> str:
-    """Which limit a motion from joints ``start`` (6,) to ``end`` (6,) breaks; "" if none."""
-    ends = end.tolist()
-    changes = [after - before for before, after in zip(start.tolist(), ends, strict=True)]
-    changes[_ROLL] = turned_back(changes[_ROLL])
-    for joint, (change, after, low, high) in enumerate(
-        zip(changes, ends, _LOW, _HIGH, strict=True)
-    ):
-        if (after > high and change > 0.0) or (after < low and change < 0.0):
-            unit, scale = ("mm", 1e3) if joint == INSERTION else ("degrees", 180 / np.pi)
-            return (
-                f"{JOINT_NAMES[joint]} would go to {after * scale:.1f} {unit}, allowed are "
-                f"{low * scale:.1f} to {high * scale:.1f}"
-            )
-    for joint, (change, speed) in enumerate(zip(changes, _SPEED, strict=True)):
-        if abs(change) > speed * time_s:
-            unit = "m/s" if joint == INSERTION else "rad/s"
-            return (
-                f"{JOINT_NAMES[joint]} would move at {abs(change) / time_s:.2f} {unit}, "
-                f"allowed are {speed:.2f}"
-            )
-    return ""
+    def _broken(self, tip: Pose, linear_m: Floats, angular_rad: Floats, time_s: float) -> str:
+        """Which limit a motion breaks; "" if none."""
+        end = tip.moved(linear_m, angular_rad)
+        start_m, end_m = tip.position_m - self._rcm_m, end.position_m - self._rcm_m
+        joint, too_fast, start, after = broken_joint(
+            tip.rotation, start_m, end.rotation, end_m, LOW, JOINT_HIGH, JOINT_SPEED, time_s
+        )
+        if joint == NONE:
+            return ""
+        if joint == UNDETERMINED:
+            # One of both raises, and says at which place.
+            joints_at(start_m, tip.rotation)
+            joints_at(end_m, end.rotation)
+        name, high, speed = JOINT_NAMES[joint], JOINT_HIGH[joint], JOINT_SPEED[joint]
+        if too_fast:
+            unit, moved = "m/s" if joint == INSERTION else "rad/s", after - start
+            moved = turned_back(moved) if joint == _ROLL else moved
+            return f"{name} would move at {abs(moved) / time_s:.2f} {unit}, allowed are {speed:.2f}"
+        unit, scale = ("mm", 1e3) if joint == INSERTION else ("degrees", 180 / np.pi)
+        return (
+            f"{name} would go to {after * scale:.1f} {unit}, allowed are "
+            f"{LOW[joint] * scale:.1f} to {high * scale:.1f}"
+        )
