@@ -35,7 +35,7 @@ class ActionParameters(NodeParameters):
 
 
 class ArmAction(Node):
-    """Base of the action leaves that plans are made of. Time is world time."""
+    """Base of the action leaves that plans are made of. Time is world time that was watched."""
 
     role: ClassVar[Role] = "motion"
     Parameters = ActionParameters
@@ -43,7 +43,7 @@ class ArmAction(Node):
     spoken: ClassVar[Literal["reach", "open", "grasp", "pull", "move", "fold", "release"]]
 
     def initialise(self) -> None:
-        self._started_s = self.context.board.inputs.time_s
+        self._started_s = self.context.board.watched_s
 
     @property
     def arm(self) -> str:
@@ -64,7 +64,7 @@ class ArmAction(Node):
 
     @property
     def elapsed_s(self) -> float:
-        return self.context.board.inputs.time_s - self._started_s
+        return self.context.board.watched_s - self._started_s
 
     @property
     def who(self) -> str:

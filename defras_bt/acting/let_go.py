@@ -72,7 +72,7 @@ class LetGo(RecoveryLeaf):
     parameters: LetGoParameters
 
     def initialise(self) -> None:
-        self._started_s = self.context.board.inputs.time_s
+        self._started_s = self.context.board.watched_s
 
     def recover(self) -> Status:
         board = self.context.board
@@ -81,7 +81,7 @@ class LetGo(RecoveryLeaf):
         for arm, grip in board.grips.items():
             self._give_up(arm, grip)
             board.move(arm, ArmCommand(jaw_rad=JAW_OPEN_RAD))
-        if board.inputs.time_s - self._started_s > JAW_TIME_OUT_S:
+        if board.watched_s - self._started_s > JAW_TIME_OUT_S:
             return self._stuck()
         return self.run(Code.OPENING, "letting go of the tissue")
 

@@ -70,7 +70,9 @@ def run(
         bool, typer.Option("--replace", help="Give up what an earlier run left in --out.")
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same run (model world).")] = 0,
-    max_time: Annotated[float, typer.Option(min=1, help="Longest world time in s.")] = 300.0,
+    max_time: Annotated[
+        float, typer.Option(min=1, help="Longest world time in s, learning not counted.")
+    ] = 300.0,
     substitute: Annotated[
         Path | None,
         typer.Option(help="File that replaces nodes by scripts, to try out what would happen."),

@@ -23,6 +23,11 @@ from defras_sim.worlds.protocol import ArmCommand, Command, Observation
 
 Outcome = Literal["goal", "not_reached", "human", "error"]
 
+LONGEST_WATCH_S = 0.5
+"""A tick counts for at most this much of what was watched. Where one lasted longer, the tree was
+computing (it learned, it rehearsed) while a real world's time went on; no patience may run out over
+what nobody looked at."""
+
 
 @dataclass(frozen=True)
 class TickInputs:
@@ -77,7 +82,8 @@ class Blackboard:
     ``metric`` names the discrepancy whose warning state counts; None for a tree without monitoring.
     ``command`` and ``rate`` start every tick at hold and 1: a rate is always taken from its
     nominal value, never from the tick before. ``force_over_s`` is how long the force has been over
-    its threshold or unknown without a break. ``unexplained``: learning last failed.
+    its threshold or unknown without a break. ``watched_s`` is the world time that was watched;
+    every patience is counted in it. ``unexplained``: learning last failed.
     ``posterior``: what it said of the attachments since the grasp, until somebody probed for it.
     ``mismatch``: what a diagnosis since the grasp found. ``slipped``: the first grip at each point
     that was given up for a slip.
@@ -111,6 +117,7 @@ class Blackboard:
 
     rest_calibrated: bool = False
     force_over_s: float = 0.0
+    watched_s: float = 0.0
     last_learning: LearningAttempt | None = None
     unexplained: bool = False
     posterior: AttachmentEstimate | None = None
@@ -122,6 +129,8 @@ class Blackboard:
 
     def begin_tick(self, inputs: TickInputs) -> None:
         """Forget the last tick's decisions; keep what lasts."""
+        passed_s = max(0.0, inputs.time_s - self.inputs.time_s)
+        self.watched_s += min(passed_s, LONGEST_WATCH_S)
         self.inputs = inputs
         self.command = Command()
         self.rate = 1.0

@@ -29,6 +29,8 @@ from defras_sim.worlds.protocol import HOLD, Command, World
 
 # So long a tree may want motion that the gate refuses before a human is asked.
 REFUSED_PATIENCE_S = 5.0
+# A tree that took longer than this to decide is spoken of: a robot stands still meanwhile.
+COMPUTED_S = 1.0
 # So many ticks the world's clock may stand still: no patience in world time would ever end then.
 CLOCK_PATIENCE_TICKS = 60
 
@@ -133,14 +135,16 @@ class Executive:
         self._tell_changes(inputs)
         with self._deadline():
             self._tick_tree()
+        returned_s = self._world.time_s
+        self._tell_computed(returned_s - inputs.time_s)
         if board.awaits_approval or operator.holds:
             self._held_s += self._context.scene.tick_s
-        if inputs.time_s - self._held_s >= self._max_time_s and board.outcome is None:
+        if board.watched_s - self._held_s >= self._max_time_s and board.outcome is None:
             board.tell("end", f"Stopped after {inputs.time_s:.0f} s without the goal.", "error")
             why = f"time is over after {inputs.time_s:.0f} s"
             board.end("not_reached", why, Code.TIME_OVER)
         self._end_if_clock_stands(inputs.time_s)
-        proposal = Proposal(board.command, board.rate, self._actions.acting, self._world.time_s)
+        proposal = Proposal(board.command, board.rate, self._actions.acting, returned_s)
         verdict = self._gate.check(proposal, inputs)
         self._tell_stopped(verdict)
         sent = verdict.command if board.outcome is None else HOLD
@@ -208,6 +212,16 @@ class Executive:
             )
         self._over_before = over
 
+    def _tell_computed(self, took_s: float) -> None:
+        """Say why a robot stood still; the time of a simulated world does not pass meanwhile."""
+        if took_s > COMPUTED_S:
+            self._board.tell(
+                "hold",
+                f"The arms held still for {took_s:.1f} s, until this was worked out.",
+                "warning",
+                {"took_s": took_s},
+            )
+
     def _tell_stopped(self, verdict: GateVerdict) -> None:
         """Say, once, that the gate stopped motion which the tree had wanted."""
         wanted = self._board.command.arms.values()
@@ -231,7 +245,7 @@ class Executive:
 
     def _end_if_refused_for_long(self, stopped: tuple[str, ...]) -> None:
         """A tree that goes on wanting what the gate refuses does not know what to do."""
-        now_s = self._board.inputs.time_s
+        now_s = self._board.watched_s
         if not stopped or self._refused_since_s is None:
             self._refused_since_s = now_s if stopped else None
         elif now_s - self._refused_since_s >= REFUSED_PATIENCE_S and self._board.outcome is None:

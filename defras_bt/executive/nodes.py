@@ -76,10 +76,10 @@ class Wait(Task):
     parameters: WaitParameters
 
     def initialise(self) -> None:
-        self._started_s = self.context.board.inputs.time_s
+        self._started_s = self.context.board.watched_s
 
     def update(self) -> Status:
-        waited_s = self.context.board.inputs.time_s - self._started_s
+        waited_s = self.context.board.watched_s - self._started_s
         if waited_s < self.parameters.seconds:
             return self.run(Code.WAITING, f"holding still: {waited_s:.1f} s")
         return self.succeed(Code.WAITED, f"held still for {waited_s:.1f} s")
