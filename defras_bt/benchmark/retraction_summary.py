@@ -16,6 +16,7 @@ MEASURES = {
     "replans": "replans",
     "s over epsilon": "time_over_threshold_s",
     "ticks over epsilon": "ticks_over_threshold",
+    "s over epsilon, true force": "time_over_threshold_true_s",
     "F max estimated N": "force_max_n",
     "F max true N": "force_max_true_n",
     "F error before updates N": "force_error_before_n",

@@ -114,6 +114,10 @@ class RunFile(BaseModel):
     force_max_true_n: Newton | None = Field(description="largest true grasp force; null if unknown")
     time_over_threshold_s: Seconds = Field(description="world time with the estimate over epsilon")
     ticks_over_threshold: Count
+    time_over_threshold_true_s: Seconds | None = Field(
+        default=None,
+        description="world time with the true grasp force over epsilon; null if unknown",
+    )
     duration_s: Seconds = Field(description="world time from the first tick to the last")
     wall_s: Seconds = Field(description="time that passed on the wall meanwhile")
     seed: int

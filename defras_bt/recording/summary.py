@@ -33,6 +33,7 @@ class SummaryRecorder:
         self._force_max_n: float | None = None
         self._force_true_max_n: float | None = None
         self._force_sum_n, self._force_ticks, self._ticks_over = 0.0, 0, 0
+        self._ticks_truly_over = 0
         self._visibility: float | None = None
         self._first_s: float | None = None
         self._last_s = 0.0
@@ -82,6 +83,9 @@ class SummaryRecorder:
                 "force_max_true_n": self._force_true_max_n,
                 "time_over_threshold_s": self._ticks_over * info.scene.tick_s,
                 "ticks_over_threshold": self._ticks_over,
+                "time_over_threshold_true_s": None
+                if self._force_true_max_n is None
+                else self._ticks_truly_over * info.scene.tick_s,
                 "duration_s": self._last_s - (self._first_s or 0.0),
                 "wall_s": wall_s,
                 "seed": info.seed,
@@ -136,6 +140,7 @@ class SummaryRecorder:
             self._ticks_over += not record.force_n <= self._started().force_threshold_n
         if record.true_force_n is not None and math.isfinite(record.true_force_n):
             self._force_true_max_n = max(self._force_true_max_n or 0.0, record.true_force_n)
+            self._ticks_truly_over += record.true_force_n > self._started().force_threshold_n
 
 
 def write_run_json(path: Path, summary: RunSummary) -> None:

@@ -31,6 +31,7 @@ PROMISED = {
     "force_max_true_n",
     "time_over_threshold_s",
     "ticks_over_threshold",
+    "time_over_threshold_true_s",
     "duration_s",
     "wall_s",
     "seed",
@@ -61,6 +62,8 @@ def test_numbers_against_the_ticks(short_run: SyntheticRun) -> None:
     assert values["force_max_true_n"] == max(r.true_force_n for r in ticks)
     assert values["ticks_over_threshold"] == np.sum(force_n > 0.3) > 0
     assert values["time_over_threshold_s"] == pytest.approx(0.05 * np.sum(force_n > 0.3))
+    over = sum(record.true_force_n > 0.3 for record in ticks)
+    assert values["time_over_threshold_true_s"] == pytest.approx(0.05 * over)
     assert values["actions"] == 9
     assert values["replans"] == 1
     assert values["warnings"] == {"1": 1, "2": 1, "3": 0}
@@ -90,6 +93,7 @@ def test_what_nobody_knows_is_null(short_run: SyntheticRun) -> None:
         "force_max_n",
         "force_mean_n",
         "force_max_true_n",
+        "time_over_threshold_true_s",
         "actual",
         "stream",
     ]
