@@ -17,6 +17,7 @@ too little.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -191,8 +192,22 @@ def _real_give(
             graded_breaks(-thickness_m, 0.0, top, _FINEST_DEEP * radius_m, 0.0, _GROWTH),
         )
     )
-    around = FlatFace(np.full(2, _WINDOW * depth_m), top)
-    return FoundedTissue(mesh, depth_m, poisson_ratio).give(np.zeros(2), radius_m, around)
+    face = _PieceFace(np.full(2, _WINDOW * depth_m), top, reach_m)
+    return FoundedTissue(mesh, depth_m, poisson_ratio).give(np.zeros(2), radius_m, face)
+
+
+@dataclass(frozen=True)
+class _PieceFace(FlatFace):
+    """The face of a piece of tissue around a disc at its origin, which may reach over its rim.
+
+    ``reach_m``: how far the piece reaches to -x, +x, -y, +y.
+    """
+
+    reach_m: tuple[float, ...]
+
+    def at(self, xy_m: Floats) -> Floats:
+        left, right, front, back = self.reach_m
+        return super().at(np.clip(xy_m, (-left, -front), (right, back)))
 
 
 @lru_cache(maxsize=16)

@@ -125,6 +125,16 @@ def test_an_anatomy_has_the_dents_of_the_slab_that_it_is():
     assert 0.0 < give[2, 0] <= expected[2, 0]
 
 
+def test_discs_that_reach_over_the_rim_of_an_anatomy_have_dents():
+    """Squeezed onto what tissue there is, they pull a little of it: it gives way further."""
+    patient = slab_as_anatomy(Tissue(), (8, 8, 1))
+    places = np.array([[0.0595 - inside_m, 0.005] for inside_m in (0.008, 0.002, 0.0005)])
+    found = DentsOf(tissue_mesh(patient, "tetrahedron10", (8, 8, 1)), patient, "neo_hookean").at(
+        places, 0.003, upper=False
+    )
+    assert np.all(np.diff(found.give_m_per_n.reshape(3, 3)[:, 0]) > 0.0)
+
+
 def test_the_force_of_an_anatomy_is_that_of_the_slab_that_it_is():
     """Without dents of its own it takes 60 % more on 8x8x1 cells."""
     scene = load_scene(resource("sim/scenes/demo.yaml"))
