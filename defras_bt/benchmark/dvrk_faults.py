@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from defras_bt.benchmark.dvrk_fault_cases import drawn
+from defras_bt.benchmark.dvrk_fault_cases import KINDS, drawn
 from defras_bt.benchmark.dvrk_fault_judge import LATE_S, DvrkVerdict
 from defras_bt.benchmark.dvrk_fault_trial import trial
 from defras_bt.benchmark.dvrk_patient import slow_patient
 from defras_bt.benchmark.own_process import ProcessFailed, in_own_process
+from defras_bt.benchmark.retraction import Row
 from defras_bt.planning.preparation import prepare
 
 _TRIAL_S = 420.0
@@ -34,11 +35,37 @@ class DvrkRun:
         return self.verdict is not None and self.verdict.passed
 
 
-def campaign(kinds: Sequence[str], seeds: Sequence[int]) -> Iterator[DvrkRun]:
-    """Run every kind with every seed, in real time: side by side they would disturb each other."""
+def key_of(kind: str, seed: int) -> str:
+    """How a run is found among rows on disk."""
+    return Row(kind, "seed", str(seed), {}).key
+
+
+def row_of(run: DvrkRun) -> Row:
+    """A run as a row on disk."""
+    verdict = None if run.verdict is None else asdict(run.verdict)
+    return Row(run.kind, "seed", str(run.seed), {"verdict": verdict, "broke": run.broke})
+
+
+def run_of(row: Row) -> DvrkRun:
+    """The run that a row on disk is of."""
+    said = row.values["verdict"]
+    verdict = None if said is None else DvrkVerdict(**{**said, "lost": tuple(said["lost"])})
+    return DvrkRun(row.case, int(row.run), verdict, row.values["broke"])
+
+
+def campaign(
+    kinds: Sequence[str], seeds: Sequence[int], done: frozenset[str] = frozenset()
+) -> Iterator[DvrkRun]:
+    """Run every kind with every seed but those in ``done``: every kind once, then once more, so
+    that a campaign that is cut short has seen all kinds.
+
+    One after the other and in real time: side by side they would disturb each other.
+    """
     prepared = prepare(slow_patient())
-    for kind in kinds:
-        for seed in seeds:
+    for seed in seeds:
+        for kind in kinds:
+            if key_of(kind, seed) in done:
+                continue
             with TemporaryDirectory(prefix="defras_dvrk_") as folder:
                 fault = drawn(kind, seed)
                 try:
@@ -52,7 +79,7 @@ def campaign(kinds: Sequence[str], seeds: Sequence[int]) -> Iterator[DvrkRun]:
 
 def by_kind(runs: Sequence[DvrkRun]) -> list[dict[str, Any]]:
     """One line per kind of fault, and one for all."""
-    kinds = list(dict.fromkeys(run.kind for run in runs))
+    kinds = [kind for kind in KINDS if any(run.kind == kind for run in runs)]
     return [
         *(_line(kind, [run for run in runs if run.kind == kind]) for kind in kinds),
         _line("all", runs),

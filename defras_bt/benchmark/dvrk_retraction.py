@@ -14,19 +14,18 @@ from defras_bt.benchmark.dvrk_patient import write_scene
 from defras_bt.benchmark.force_error import ForceError
 from defras_bt.benchmark.own_process import ProcessFailed, in_own_process
 from defras_bt.benchmark.retraction import Preparations, Row, plan_for
-from defras_bt.dvrk.laboratory import open_world
-from defras_bt.dvrk.settings import load_setup
+from defras_bt.dvrk.laboratory import at_robot_speed, open_world
+from defras_bt.dvrk.settings import Ros1Transport, load_setup
+from defras_bt.dvrk.stand_in.belief import measured_belief
 from defras_bt.dvrk.stand_in.imperfections import read_imperfections
 from defras_bt.dvrk.stand_in.order import WorldName
 from defras_bt.dvrk.stand_in.ros_master import RosMaster
-from defras_bt.dvrk.stand_in.set_up import SETUP_FILE
+from defras_bt.dvrk.stand_in.set_up import SETUP_FILE, set_up_of
 from defras_bt.dvrk.stand_in.stand_in_process import StandInProcess
 from defras_bt.executive.executive import ExecutiveFailed
 from defras_bt.executive.operation import ROBOT_WORLD, Operation, operate_in, random_generators
 from defras_bt.executive.tree_file import read_tree
 from defras_bt.planning.preparation import needs_plan
-from defras_sim.effects import library
-from defras_sim.effects.effect import ArmEffect
 from defras_sim.resources import resource
 from defras_sim.scene import Scene
 
@@ -41,15 +40,6 @@ class DvrkSetting:
     patient: WorldName = "bullet"
     imperfections: str = "lab"
     speed: float = 1.0
-
-
-def calibrated(scene: Scene, imperfections: str) -> Scene:
-    """``scene`` as believed by a laboratory that has measured its arms, by ``defras diagnose --twin
-    arm``: it knows what their joints do. Errors of registration stay unknown, and so does what the
-    cameras do."""
-    found = read_imperfections(imperfections).extension
-    known = {name: values for name, values in found.items() if _of_joints(name)}
-    return scene.extended({**scene.model.extension, **known})
 
 
 def dvrk_rows(
@@ -68,15 +58,16 @@ def dvrk_rows(
             if row.key in done:
                 continue
             believed, actual = case.scenes()
-            believed = calibrated(believed, setting.imperfections)
-            twin = believed.for_bullet() if setting.patient == "bullet" else believed
+            imperfections = read_imperfections(setting.imperfections)
+            believed = measured_belief(believed, imperfections, setting.patient)
+            setup = set_up_of(Ros1Transport().master_uri, believed)
             tree_file = resource(f"trees/{tree}.yaml")
             plan = None
             if needs_plan(read_tree(tree_file)):
-                plan = plan_for(twin, preparations, 0, seed).plan
+                plan = plan_for(believed, preparations, 0, seed).plan
             threshold_n = believed.thresholds.force_n or 2 * preparations.force_median_n
             operation = Operation(
-                scene=twin,
+                scene=at_robot_speed(believed, setup),
                 actual=None,
                 scene_file=f"{believed.name}.yaml",
                 actual_file=None,
@@ -132,8 +123,3 @@ def _operate(
 
 def _arm_facts(witness: Path) -> list[Any]:
     return [fact for fact in read_facts(witness) if fact["event"] == "arm"]
-
-
-def _of_joints(name: str) -> bool:
-    effect = library.effect(name)
-    return isinstance(effect, ArmEffect) and type(effect).joints is not ArmEffect.joints

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
 from defras_bt.benchmark.dvrk_fault_cases import KINDS
-from defras_bt.benchmark.dvrk_faults import DvrkRun, by_kind, by_run, campaign
+from defras_bt.benchmark.dvrk_faults import DvrkRun, by_kind, by_run, campaign, row_of, run_of
 from defras_bt.benchmark.files import write_benchmark
+from defras_bt.benchmark.row_store import OtherBenchmark, RowStore
 from defras_bt.cli.errors import ExitCode, UserError
 from defras_bt.cli.files import folder_for
 from defras_bt.dvrk.ros_packages import RosMissing, ros_module
@@ -35,6 +36,9 @@ def dvrk_faults(
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/benchmark"),
     times: Annotated[int, typer.Option(min=1, help="Runs of each kind.")] = 10,
     kinds: Annotated[str, typer.Option(help="Kinds of faults, separated by commas.")] = "all",
+    resume: Annotated[
+        bool, typer.Option(help="Go on with the runs already in the folder.")
+    ] = False,
 ) -> None:
     """Every kind of fault many times over a real ROS master; exit code 3 if a run fails.
 
@@ -51,14 +55,17 @@ def dvrk_faults(
         raise UserError(str(error)) from error
     folder_for(out)
     console = Console(stderr=True, soft_wrap=True, highlight=False)
-    runs: list[DvrkRun] = []
-    for run in campaign(chosen, range(times)):
-        runs.append(run)
+    try:
+        rows = RowStore(out / "dvrk_faults.rows.jsonl", "faults on a dVRK", resume=resume)
+    except OtherBenchmark as error:
+        raise UserError(str(error)) from error
+    for run in campaign(chosen, range(times), rows.done):
+        rows.add(row_of(run))
         console.print(_told(run), markup=False)
-        summary = by_kind(runs)
         # After every run, so that a campaign that is cut short leaves what it found.
-        tables = {"By kind of fault": summary, "By run": by_run(runs)}
-        write_benchmark(out, "dvrk_faults", "Faults on a dVRK", tables, _NOTES)
+        _write(out, [run_of(row) for row in rows.rows])
+    runs = [run_of(row) for row in rows.rows]
+    summary = _write(out, runs)
     shown = Table(*_SHOWN)
     for line in summary:
         shown.add_row(*(str(line[column]) for column in _SHOWN))
@@ -66,6 +73,14 @@ def dvrk_faults(
     typer.echo(f"Written to {out}: dvrk_faults.json, dvrk_faults.csv, dvrk_faults.html")
     if not all(run.passed for run in runs):
         raise typer.Exit(ExitCode.NOT_REACHED)
+
+
+def _write(out: Path, runs: list[DvrkRun]) -> list[dict[str, Any]]:
+    """Write the tables of ``runs``; the one by kind of fault."""
+    summary = by_kind(runs)
+    tables = {"By kind of fault": summary, "By run": by_run(runs)}
+    write_benchmark(out, "dvrk_faults", "Faults on a dVRK", tables, _NOTES)
+    return summary
 
 
 def _told(run: DvrkRun) -> str:

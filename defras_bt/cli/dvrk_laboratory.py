@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from defras_bt.recording.record import Recorder
 
 
-def checked_laboratory(file: Path | None, scene: Scene) -> tuple[Setup, Scene]:
-    """The set-up of ``file``, if a fresh check of it has passed for ``scene``; and ``scene`` at the
-    speed of that robot.
+def checked_laboratory(file: Path | None, scene: Scene) -> Setup:
+    """The set-up of ``file``, if a fresh check of it has passed for ``scene``.
 
     Raises:
         UserError: there is none, or no check allows a run.
@@ -25,7 +24,6 @@ def checked_laboratory(file: Path | None, scene: Scene) -> tuple[Setup, Scene]:
     """
     # Loaded only where a robot is asked for.
     from defras_bt.dvrk.checking.report import NotChecked, require_checked
-    from defras_bt.dvrk.laboratory import at_robot_speed
     from defras_bt.dvrk.settings import load_setup
 
     if file is None:
@@ -38,7 +36,15 @@ def checked_laboratory(file: Path | None, scene: Scene) -> tuple[Setup, Scene]:
         require_checked(setup, scene, datetime.now(UTC))
     except NotChecked as error:
         raise UserError(f"--world dvrk: {error}") from error
-    return setup, at_robot_speed(scene, setup)
+    return setup
+
+
+def slowed(scene: Scene, setup: Setup) -> Scene:
+    """``scene`` at the speed of that robot. Plans are made for ``scene`` itself: how fast arms
+    reach changes nothing about them."""
+    from defras_bt.dvrk.laboratory import at_robot_speed
+
+    return at_robot_speed(scene, setup)
 
 
 def connected(setup: Setup, scene: Scene, out: Path | None) -> DvrkWorld:

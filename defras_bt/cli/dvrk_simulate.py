@@ -16,11 +16,13 @@ from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import find_scene, folder_for, require_folder
 from defras_bt.dvrk.ros_packages import RosMissing
 from defras_bt.dvrk.settings import Setup
+from defras_bt.dvrk.stand_in.belief import measured_belief
 from defras_bt.dvrk.stand_in.faults import read_faults
 from defras_bt.dvrk.stand_in.imperfections import read_imperfections
 from defras_bt.dvrk.stand_in.order import Clock, StandInOrder, WorldName
 from defras_bt.dvrk.stand_in.set_up import (
     REGISTRATION_FILE,
+    SCENE_FILE,
     SETUP_FILE,
     registration_of,
     set_up_of,
@@ -28,7 +30,7 @@ from defras_bt.dvrk.stand_in.set_up import (
 )
 from defras_bt.dvrk.stand_in.stand_in import StandIn
 from defras_bt.dvrk.transport.transport import ConnectionFailed
-from defras_sim.scene import Scene
+from defras_sim.scene import NotASlab, Scene
 
 
 def simulate(
@@ -57,7 +59,8 @@ def simulate(
     set_up: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for the set-up and registration files that reach it; it may have none yet."
+            help="Folder for the files that reach it (set-up, registration, the scene with what "
+            "its arms do); it may have none yet."
         ),
     ] = None,
 ) -> None:
@@ -92,6 +95,10 @@ def simulate(
     if witness is not None:
         require_folder(witness, "--witness")
     reached = _reached_at(order.master_uri, believed)
+    try:
+        belief = measured_belief(believed, order.imperfections, order.world)
+    except NotASlab as error:
+        raise UserError(f"--world {world}: {error}") from error
     if set_up is not None:
         _require_free(set_up)
     try:
@@ -101,8 +108,9 @@ def simulate(
     if set_up is not None:
         measured = datetime.now(UTC).replace(microsecond=0)
         registration = registration_of(believed, order.imperfections, measured)
-        file = write_set_up(set_up, reached, registration)
-        console.print(f"It is reached with --setup {file}", markup=False)
+        file = write_set_up(set_up, reached, registration, belief)
+        scene_file = set_up / SCENE_FILE
+        console.print(f"It is reached with {scene_file} --setup {file}", markup=False)
 
     def end(_signal: int, _frame: FrameType | None) -> None:
         stand_in.stop()
@@ -132,7 +140,8 @@ def _reached_at(master_uri: str, scene: Scene) -> Setup:
 def _require_free(folder: Path) -> None:
     """See that nobody's set-up or registration would be written over in ``folder``."""
     folder_for(folder, "--set-up")
-    taken = [name for name in (SETUP_FILE, REGISTRATION_FILE) if (folder / name).exists()]
+    written = (SETUP_FILE, REGISTRATION_FILE, SCENE_FILE)
+    taken = [name for name in written if (folder / name).exists()]
     if taken:
         raise UserError(
             f"--set-up {folder}: has a {' and a '.join(taken)} already, which may be a robot's; "

@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from defras_bt.cli.at_the_desk import at_the_desk
-from defras_bt.cli.dvrk_laboratory import checked_laboratory, connected, told_to_ros
+from defras_bt.cli.dvrk_laboratory import checked_laboratory, connected, slowed, told_to_ros
 from defras_bt.cli.errors import OUTCOME_CODES, ExitCode, UserError
 from defras_bt.cli.files import find, find_scene, folder_for
 from defras_bt.cli.interrupts import Interrupts
@@ -33,7 +33,9 @@ from defras_bt.executive.tree_file import read_tree
 from defras_bt.executive.tree_spec import TreeSpec
 from defras_bt.faults.faults import NO_FAULTS, FaultInjection
 from defras_bt.faults.file import read_faults
+from defras_bt.learning.chain.estimators import NETWORK_OF
 from defras_bt.learning.networks.own_weights import OwnWeights
+from defras_bt.learning.nodes import LearnParameters
 from defras_bt.planning.preparation import needs_plan
 from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.composite import RecordingFailed
@@ -107,7 +109,7 @@ def run(
     laboratory = None
     if world == ROBOT_WORLD:
         _require_no_trial(actual=actual, substitute=substitute, faults=faults)
-        laboratory, believed = checked_laboratory(setup, believed)
+        laboratory = checked_laboratory(setup, believed)
     elif setup is not None:
         raise UserError(f"--setup {setup}: only --world {ROBOT_WORLD} has a laboratory")
     actual_file, truth = find_scene(actual) if actual is not None else (None, believed)
@@ -118,6 +120,8 @@ def run(
     substitutes = NOTHING_SUBSTITUTED if substitute is None else read_substitutes(substitute)
     substituted = substitutes.paths(tree_spec)
     own_weights = None if weights is None else OwnWeights.of(weights)
+    if own_weights is not None:
+        _require_asked(own_weights, tree_spec)
     injected = NO_FAULTS
     if faults is not None:
         injected = read_faults(find(faults, "sim/faults"), believed.arms)
@@ -132,6 +136,8 @@ def run(
     )
     if prepared.result is not None:
         tell(prepared.result, console)
+    if laboratory is not None:
+        believed = slowed(believed, laboratory)
     operation = Operation(
         scene=believed,
         actual=truth if laboratory is None else None,
@@ -257,6 +263,23 @@ def _require_safe(tree: TreeSpec, named: str) -> None:
         raise UserError(
             f"--tree {named}: not run, because it is not proved that {claims}. "
             f"`defras tree prove {named}` shows the ticks that break it and the node at fault"
+        )
+
+
+def _require_asked(own: OwnWeights, tree: TreeSpec) -> None:
+    """Weights that no leaf of the tree asks are a mistake that nobody would notice."""
+    learns = {
+        spec.options.estimator
+        for _, spec in tree.root.walk()
+        if isinstance(spec.options, LearnParameters)
+    }
+    asked = {network for name in learns if (network := NETWORK_OF[name]) is not None}
+    there = [name for name, _ in own.cards]
+    if asked.isdisjoint(there):
+        does = f"asks {' and '.join(sorted(asked))}" if asked else "asks no network"
+        raise UserError(
+            f"--weights {own.folder}: it holds weights of {' and '.join(there)}, but the tree "
+            f"{tree.name} {does}; see `estimator` of LearnAttachments"
         )
 
 

@@ -16,14 +16,11 @@ from defras_bt.benchmark.dvrk_fault_judge import (
     moving,
     read_facts,
 )
-from defras_bt.benchmark.dvrk_faults import DvrkRun, by_kind, by_run
-from defras_bt.benchmark.dvrk_retraction import calibrated
+from defras_bt.benchmark.dvrk_faults import DvrkRun, by_kind, by_run, key_of, row_of, run_of
 from defras_bt.benchmark.own_process import ProcessFailed, in_own_process
+from defras_bt.benchmark.row_store import RowStore
 from defras_bt.dvrk.settings import Limits
 from defras_bt.dvrk.stand_in.faults import fault_of
-from defras_bt.dvrk.stand_in.imperfections import read_imperfections
-from defras_sim.resources import resource
-from defras_sim.scene import load_scene
 
 GOAL = {"event": "goal", "command": "servo_cp", "arm": "psm1", "jaw": 0.0}
 FACTS = [
@@ -127,6 +124,22 @@ def test_tables_count_what_had_to_stop_and_what_broke():
     assert [line["passed"] for line in by_run(runs)] == [True, False, True, False]
 
 
+@pytest.mark.parametrize(
+    "run",
+    [
+        DvrkRun("paused", 3, verdict(lost=("run.json: gone",))),
+        DvrkRun("duplicated", 0, verdict(known_s=None, begun_s=np.inf, last_s=None)),
+        DvrkRun("lost", 1, None, "it took too long"),
+    ],
+)
+def test_a_run_on_disk_is_the_run_it_was(run: DvrkRun, tmp_path: Path):
+    file = tmp_path / "rows.jsonl"
+    RowStore(file, "faults", resume=False).add(row_of(run))
+    (row,) = RowStore(file, "faults", resume=True).rows
+    assert run_of(row) == run
+    assert row.key == key_of(run.kind, run.seed)
+
+
 def doubled(number: int) -> int:
     if number < 0:
         raise ValueError("less than nothing")
@@ -137,10 +150,3 @@ def test_a_function_runs_in_a_process_of_its_own():
     assert in_own_process(doubled, 21, within_s=60.0) == 42
     with pytest.raises(ProcessFailed, match="less than nothing"):
         in_own_process(doubled, -1, within_s=60.0)
-
-
-def test_a_calibrated_laboratory_knows_joints_and_not_registrations():
-    believed = calibrated(load_scene(resource("sim/scenes/A_fewer.yaml")), "lab")
-    known, real = believed.model.extension, read_imperfections("lab").extension
-    assert set(known) == {"servo_lag", "joint_play", "joint_coupling"}
-    assert all(dict(known[name]) == dict(real[name]) for name in known)

@@ -113,7 +113,8 @@ def test_nothing_is_given_up_for_a_robot_that_does_not_answer(
     def silent(*_: object) -> None:
         raise UserError("--world dvrk: no ROS 1 master answers")
 
-    monkeypatch.setattr(run_command, "checked_laboratory", lambda _, believed: ("lab", believed))
+    monkeypatch.setattr(run_command, "checked_laboratory", lambda *_: "lab")
+    monkeypatch.setattr(run_command, "slowed", lambda believed, _: believed)
     monkeypatch.setattr(run_command, "connected", silent)
     arguments = ("run", scene, "--tree", "fras", "--world", "dvrk", "--out", str(out))
     code, _, err = defras(*arguments)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from defras_bt.cli.dvrk_laboratory import checked_laboratory
+from defras_bt.cli.dvrk_laboratory import checked_laboratory, slowed
 from defras_bt.cli.errors import UserError
 from defras_bt.dvrk.arm_frames import ArmFrames
 from defras_bt.dvrk.checking.finding import Finding, ok, wrong
@@ -215,10 +215,11 @@ class TestRefusal:
 
     def test_a_run_goes_no_faster_than_the_robot(self, setup: Setup, scene: Scene) -> None:
         self.write(setup, scene, checked=datetime.now(UTC))
-        _, slowed = checked_laboratory(setup.checked.with_name("lab.yaml"), scene)
+        laboratory = checked_laboratory(setup.checked.with_name("lab.yaml"), scene)
+        on_robot = slowed(scene, laboratory)
         assert scene.motion.reach_speed_m_s == 0.05
-        assert slowed.motion.reach_speed_m_s == 0.04
-        assert slowed.motion.tissue_speed_m_s == scene.motion.tissue_speed_m_s
+        assert on_robot.motion.reach_speed_m_s == 0.04
+        assert on_robot.motion.tissue_speed_m_s == scene.motion.tissue_speed_m_s
 
     @pytest.mark.parametrize(
         ("changes", "after_h", "says"),

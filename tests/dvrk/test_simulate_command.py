@@ -20,7 +20,7 @@ def defras_dvrk(*arguments: object) -> None:
         raise result.exception
 
 
-@pytest.mark.parametrize("name", ["dvrk.yaml", "registration.yaml"])
+@pytest.mark.parametrize("name", ["dvrk.yaml", "registration.yaml", "scene.yaml"])
 def test_a_laboratory_is_not_written_over(tmp_path: Path, name: str) -> None:
     lab = tmp_path / name
     lab.write_text("of a real robot")

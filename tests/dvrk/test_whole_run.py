@@ -15,7 +15,7 @@ from time import sleep
 import numpy as np
 import pytest
 
-from defras_bt.benchmark.dvrk_fault_judge import moving, read_facts
+from defras_bt.benchmark.dvrk_fault_judge import LATE_S, moving, read_facts
 from defras_bt.benchmark.dvrk_patient import slow_patient, write_scene
 from defras_bt.diagnosis.recording_reader import read_recording
 from defras_bt.dvrk.registering.registration import read_registration
@@ -36,7 +36,6 @@ _DEFRAS = (
     "-c",
     "import sys; from defras_bt.cli.main import main; sys.exit(main())",
 )
-_LATE_S = 0.05
 # Several processes in real time: one that a busy machine starves is asked again.
 pytestmark = pytest.mark.flaky(reruns=2)
 
@@ -175,7 +174,7 @@ def require_still_while_paused(witness: Path) -> None:
         for begins in (True, False)
     )
     assert len(begun) == len(ended) == 2
-    between = [t for t in moving(read_facts(witness)) if min(begun) + _LATE_S < t < max(ended)]
+    between = [t for t in moving(read_facts(witness)) if min(begun) + LATE_S < t < max(ended)]
     assert between == []
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal
 
 from defras_bt.dvrk.stand_in.faults import StandInFault
@@ -17,7 +19,9 @@ WorldName = Literal["model", "bullet"]
 PERIOD_S = 0.01
 """A dVRK publishes at 100 Hz unless told otherwise."""
 
-WORLD_TICK_S = 0.02
+WORLD_TICKS_S: Mapping[WorldName, float] = MappingProxyType({"model": 0.05, "bullet": 0.02})
+"""How often the patient is told where the tips are. Tissue in equilibrium depends on where they
+are, not on how often it is asked, and an answer costs tens of milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,11 @@ class StandInOrder:
     operating: Operating = field(default_factory=Operating)
     faults: tuple[StandInFault, ...] = ()
     witness: Path | None = None
+
+    @property
+    def world_tick_s(self) -> float:
+        """Of the patient's world."""
+        return WORLD_TICKS_S[self.world]
 
     @property
     def simulated_clock(self) -> bool:

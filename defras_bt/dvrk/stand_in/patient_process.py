@@ -20,7 +20,7 @@ from defras_bt.dvrk.stand_in.delivery import Delivery
 from defras_bt.dvrk.stand_in.fault_topic import take_orders
 from defras_bt.dvrk.stand_in.faults import Source
 from defras_bt.dvrk.stand_in.menu import Menu
-from defras_bt.dvrk.stand_in.order import WORLD_TICK_S, StandInOrder, WorldName
+from defras_bt.dvrk.stand_in.order import StandInOrder, WorldName
 from defras_bt.dvrk.stand_in.patient import ArmFeedback, Patient, TipTarget, patient_scene
 from defras_bt.dvrk.stand_in.ros_node import join
 from defras_bt.dvrk.stand_in.witness import Witness, cameras_witness
@@ -142,7 +142,7 @@ def _live(order: PatientOrder, line: Connection) -> None:
         rospy = join(whole.master_uri, NODE, simulated_clock=whole.simulated_clock)
         world_rng, camera_rng, delivery_rng = np.random.default_rng([whole.seed, 2]).spawn(3)
         actual = whole.imperfections.seen_by(whole.actual)
-        world = _world(whole.world, patient_scene(actual, WORLD_TICK_S), world_rng)
+        world = _world(whole.world, patient_scene(actual, whole.world_tick_s), world_rng)
         patient = Patient(world, actual, whole.imperfections, camera_rng)
         patient.start_at(order.tips)
         line.send(Felt(0, patient.feedback()))

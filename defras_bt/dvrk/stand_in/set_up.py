@@ -1,4 +1,4 @@
-"""The set-up and registration files with which a laboratory would reach the stand-in."""
+"""The set-up, registration and scene files with which a laboratory would reach the stand-in."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ from defras_sim.camera.pinhole import tissue_from_camera
 from defras_sim.effects.layers import Layers
 from defras_sim.geometry import Pose
 from defras_sim.scene import Scene
+from defras_sim.scene_file import write_scene
 
-SETUP_FILE, REGISTRATION_FILE = "dvrk.yaml", "registration.yaml"
+SETUP_FILE, REGISTRATION_FILE, SCENE_FILE = "dvrk.yaml", "registration.yaml", "scene.yaml"
 
 
 def set_up_of(master_uri: str, scene: Scene) -> Setup:
@@ -65,8 +66,8 @@ def registration_of(scene: Scene, imperfections: Imperfections, measured: dateti
     )
 
 
-def write_set_up(folder: Path, setup: Setup, registration: Registration) -> Path:
-    """Write both files into ``folder``; returns the set-up file.
+def write_set_up(folder: Path, setup: Setup, registration: Registration, belief: Scene) -> Path:
+    """Write the files into ``folder``; returns the set-up file.
 
     Raises:
         OSError: they cannot be written.
@@ -78,4 +79,5 @@ def write_set_up(folder: Path, setup: Setup, registration: Registration) -> Path
     YAML().dump(plain, text)
     write_whole(folder / SETUP_FILE, text.getvalue())
     write_registration(registration, folder / REGISTRATION_FILE)
+    write_scene(belief, folder / SCENE_FILE)
     return folder / SETUP_FILE

@@ -15,7 +15,7 @@ from defras_bt.dvrk.stand_in.delivery import Delivery
 from defras_bt.dvrk.stand_in.drive import joints_near
 from defras_bt.dvrk.stand_in.fault_topic import take_orders
 from defras_bt.dvrk.stand_in.menu import Menu
-from defras_bt.dvrk.stand_in.order import PERIOD_S, WORLD_TICK_S, StandInOrder
+from defras_bt.dvrk.stand_in.order import PERIOD_S, StandInOrder
 from defras_bt.dvrk.stand_in.pacing import Pace, RealPace, SimulatedPace
 from defras_bt.dvrk.stand_in.patient_process import Motion, PatientOrder, PatientProcess
 from defras_bt.dvrk.stand_in.psm import Psm
@@ -128,7 +128,7 @@ class StandIn:
     def _keep_up(self) -> None:
         """Tell the patient of every tick that has passed, and hear what it answers."""
         now_s = self._pace.now_s()
-        while (self._ticks + 1) * WORLD_TICK_S <= now_s + 1e-9:
+        while (self._ticks + 1) * self._order.world_tick_s <= now_s + 1e-9:
             self._ticks += 1
             targets = {name: station.target() for name, station in self._stations.items()}
             self._patient.tell(Motion(self._ticks, targets))
@@ -148,7 +148,7 @@ class StandIn:
                 raise RuntimeError(f"the patient gave no sign for {_WAIT_S:g} s")
 
     def _watch_lateness(self, now_s: float) -> None:
-        behind_s = (self._ticks - self._patient.tick) * WORLD_TICK_S
+        behind_s = (self._ticks - self._patient.tick) * self._order.world_tick_s
         if behind_s > LATE_AFTER_S and not self._late:
             self._late = True
             self._say(

@@ -22,7 +22,8 @@ NOW = datetime(2026, 1, 1, tzinfo=UTC)
 def test_they_are_read_back_as_they_were_meant(tmp_path):
     setup = set_up_of("http://127.0.0.1:11500", SCENE)
     registration = registration_of(SCENE, Imperfections(), NOW)
-    file = write_set_up(tmp_path / "lab", setup, registration)
+    file = write_set_up(tmp_path / "lab", setup, registration, SCENE)
+    assert load_scene(file.with_name("scene.yaml")) == SCENE
     read = load_setup(file)
     assert read.transport == setup.transport
     assert read.arms == setup.arms
