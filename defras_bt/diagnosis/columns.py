@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defras_bt.diagnosis.problem import Candidate, Problem, Tangent
+from defras_bt.diagnosis.problem import Candidate, Linearised, Tangent
 from defras_sim.effects.effect import EffectParameter, Extension
 from defras_sim.geometry import Floats
 
@@ -47,7 +47,7 @@ class Sketch:
 
 
 def sketch(
-    problem: Problem,
+    problem: Linearised,
     model: Extension,
     candidates: Sequence[Candidate],
     told: Callable[[str, float], None] | None = None,

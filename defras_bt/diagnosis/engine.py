@@ -20,6 +20,7 @@ from defras_bt.diagnosis.intervals import estimates, standard_errors
 from defras_bt.diagnosis.outside import left_over
 from defras_bt.diagnosis.plain_squares import fit_plainly
 from defras_bt.diagnosis.problem import Approximating, Problem, Remarking
+from defras_bt.diagnosis.proposal import proposed_motion
 from defras_bt.diagnosis.search import Progress
 from defras_bt.diagnosis.selection import select
 from defras_bt.diagnosis.sets import rivals
@@ -109,13 +110,15 @@ def _settle(found: Findings, told: Progress) -> None:
         del found.estimates[doubtful[-1]]
     for key in search.accepted():
         found.rivals[key] = rivals(search, key, found.confounding, told)
+    told("which motion would tell causes apart", 0.55)
+    found.proposed = proposed_motion(search, found.ambiguous())
     told("what each cause gains", 0.6)
     _measure_gains(found)
     told("what is left over", 0.7)
     left = search.held_out(search.fit, search.noise).residual
-    found.left = left_over(
-        left, search.samples, search.noise, search.settings.surrogates, search.rng
-    )
+    count = search.settings.surrogates
+    off = search.approximations(count)
+    found.left = left_over(left, search.samples, search.noise, count, search.rng, off)
     told("what is excluded", 0.8)
     found.excluded, found.unseen = exclusions(search)
 

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from defras_bt.diagnosis.columns import Option, sketch
 from defras_bt.diagnosis.noise import tolerances
-from defras_bt.diagnosis.problem import Problem
+from defras_bt.diagnosis.problem import Linearised
 from defras_sim.effects.effect import EffectParameter, Extension
 from defras_sim.geometry import Floats
 
 
-class PlannedMotion(Problem, Protocol):
-    """A problem whose ``residual`` is never asked for."""
+class PlannedMotion(Linearised, Protocol):
+    """A motion that nobody has made yet: what would be compared, and what causes would change."""
 
     @property
     def sentence(self) -> str:
@@ -30,6 +30,27 @@ class PlannedMotion(Problem, Protocol):
     @property
     def peak_force_n(self) -> float:
         """The largest force that the twin expects in it [N]."""
+        ...
+
+
+Strengths = Mapping[str, Mapping[str, float]]
+"""By key of each candidate in question, its parameters as fitted to the data."""
+
+
+@runtime_checkable
+class Planning(Protocol):
+    """A problem that knows which other motions could be made of what was recorded."""
+
+    @property
+    def force_limit_n(self) -> float:
+        """The largest force that a jaw may exert in them [N]."""
+        ...
+
+    def planned_motions(
+        self, model: Extension, strengths: Strengths, rng: np.random.Generator
+    ) -> Sequence[PlannedMotion]:
+        """Motions beside ``model``, which has none of the candidates in question; their tangents
+        are those at ``model``."""
         ...
 
 
@@ -45,7 +66,7 @@ class Separation:
 def separating_motions(
     motions: Sequence[PlannedMotion],
     model: Extension,
-    strengths: Mapping[str, Mapping[str, float]],
+    strengths: Strengths,
     force_limit_n: float,
     independent_share: float = 1.0,
 ) -> tuple[Separation, ...]:
@@ -72,9 +93,7 @@ def separating_motions(
     return tuple(sorted(found, key=lambda one: -one.separation))
 
 
-def _smallest(
-    motion: PlannedMotion, model: Extension, strengths: Mapping[str, Mapping[str, float]]
-) -> float:
+def _smallest(motion: PlannedMotion, model: Extension, strengths: Strengths) -> float:
     known = {c.key: c for c in motion.candidates}
     missing = [key for key in strengths if key not in known]
     if missing:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from defras_bt.diagnosis.autoregression import stationary_variance
+from defras_bt.diagnosis.autoregression import tamed
 from defras_bt.diagnosis.layout import Layout, Series
 from defras_bt.diagnosis.problem import Channel, Samples
 from defras_bt.diagnosis.whitening import innovations
@@ -24,6 +24,8 @@ _ORDERS = (0, 1, 2, 3, 4, 6, 8)
 _SHARED = 300.0
 """Samples' worth of weight that the other channels of the same sensor have in a channel's
 autocorrelation: short series borrow, long ones keep their own."""
+_FEWEST = 20.0
+"""Samples of a sensor below which its autocorrelation is not asked for."""
 _LARGEST = 4.0
 """Robust standard deviations beyond which a residual is an outlier."""
 _WILDEST = 2.0
@@ -107,17 +109,7 @@ def estimate_noise(
         windows = _windows(standard, seen, one, order)
         moments[one.channel] += windows.T @ windows
         counts[one.channel] += len(windows)
-    channels = tuple(
-        _fit(
-            moments,
-            counts,
-            c,
-            samples.channels,
-            float(scale[c]),
-            _ORDERS if orders is None else (orders[c],),
-        )
-        for c in range(len(samples.channels))
-    )
+    channels = _fitted(moments, counts, samples.channels, scale, orders)
     plain = Noise(found, channels, seen, np.ones(len(residual)))
     new = np.abs(plain.whiten(np.where(seen, residual, 0.0)[:, None])[:, 0])
     weight = np.minimum(1.0, _LARGEST / np.maximum(new, _LARGEST))
@@ -150,49 +142,61 @@ def _windows(standard: Floats, seen: NDArray[np.bool_], one: Series, order: int)
     return runs[np.isfinite(runs).all(axis=1)]
 
 
-def _fit(
+def _fitted(
     moments: Floats,
     counts: Floats,
-    channel: int,
-    channels: tuple[Channel, ...],
-    sd: float,
-    orders: Sequence[int],
-) -> ChannelNoise:
-    """Least-squares autoregression of one channel, its order one of ``orders`` by Schwarz."""
-    same = [i for i, c in enumerate(channels) if c.sensor == channels[channel].sensor]
-    shared = float(counts[same].sum())
-    if shared < 20.0:
-        return ChannelNoise(sd, np.zeros(0), sd)
-    borrowed = min(_SHARED, shared)
-    moment = moments[channel] + borrowed * moments[same].sum(axis=0) / shared
-    count = counts[channel] + borrowed
-    moment = moment / count + 1e-9 * np.eye(len(moment))
-    best, least, chosen = np.inf, 1.0, np.zeros(0)
-    for order in orders:
-        if order >= len(moment):
+    channels: Sequence[Channel],
+    scale: Floats,
+    orders: Sequence[int] | None,
+) -> tuple[ChannelNoise, ...]:
+    """Least-squares autoregressions of all channels from their ``moments`` (c, p+1, p+1) in units
+    of ``scale`` (c,), of the ``orders`` (c,) given or of those that Schwarz's criterion chooses."""
+    moment, count, few = _lent(moments, counts, channels)
+    every = np.arange(len(channels))
+    best, least = np.full(len(channels), np.inf), np.ones(len(channels))
+    chosen = np.zeros((len(channels), moments.shape[1] - 1))
+    length = np.zeros(len(channels), dtype=np.int64)
+    for order in sorted(set(_ORDERS if orders is None else orders)):
+        if order >= moments.shape[1]:
             break
+        tried = every if orders is None else every[np.asarray(orders) == order]
+        own = moment[tried]
         past = slice(1, order + 1)
-        ar = np.linalg.solve(moment[past, past], moment[past, 0])
-        left = float(moment[0, 0] - moment[0, past] @ ar)
-        criterion = count * np.log(max(left, 1e-12)) + order * np.log(count)
-        if criterion < best:
-            best, least, chosen = criterion, left, ar
-    return _stable(chosen, float(np.sqrt(max(least, 1e-12))), sd)
+        ar = np.linalg.solve(own[:, past, past], own[:, past, :1])[:, :, 0]
+        left = own[:, 0, 0] - np.einsum("cp,cp->c", own[:, 0, past], ar)
+        criterion = count[tried] * np.log(np.maximum(left, 1e-12)) + order * np.log(count[tried])
+        better = criterion < best[tried]
+        at = tried[better]
+        best[at], least[at], length[at] = criterion[better], left[better], order
+        chosen[at] = 0.0
+        chosen[at, :order] = ar[better]
+    innovation_sd = np.sqrt(np.maximum(least, 1e-12))
+    return tuple(
+        ChannelNoise(float(scale[c]), np.zeros(0), float(scale[c]))
+        if few[c]
+        else ChannelNoise(
+            float(scale[c]),
+            tamed(chosen[c, : length[c]], float(innovation_sd[c]), _WILDEST, _FINELY),
+            float(innovation_sd[c] * scale[c]),
+        )
+        for c in every
+    )
 
 
-def _stable(ar: Floats, innovation_sd: float, sd: float) -> ChannelNoise:
-    """Pull roots inwards until the process is stationary and not wilder than what was seen."""
-    if not len(ar):
-        return ChannelNoise(sd, ar, innovation_sd * sd)
-    lags = np.arange(1, len(ar) + 1)
-    wild, tame = 1.0, 0.0
-    if stationary_variance(ar, innovation_sd) <= _WILDEST:
-        tame = wild
-    while wild - tame > _FINELY:
-        middle = 0.5 * (wild + tame)
-        if stationary_variance(ar * middle**lags, innovation_sd) <= _WILDEST:
-            tame = middle
-        else:
-            wild = middle
-    ar = ar * tame**lags
-    return ChannelNoise(sd, ar, innovation_sd * sd)
+def _lent(
+    moments: Floats, counts: Floats, channels: Sequence[Channel]
+) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Mean moments of each channel with what the others of its sensor lend it, of how many samples
+    (c,) they are, and where there are too few of the whole sensor to tell anything (c,)."""
+    sensors = np.array([channel.sensor for channel in channels])
+    moment, count = moments.copy(), counts.copy()
+    few = np.zeros(len(channels), bool)
+    for sensor in np.unique(sensors):
+        own = sensors == sensor
+        shared = float(counts[own].sum())
+        few[own] = shared < _FEWEST
+        borrowed = min(_SHARED, shared)
+        moment[own] += borrowed * moments[own].sum(axis=0) / max(shared, 1.0)
+        count[own] += borrowed
+    count = np.maximum(count, 1.0)
+    return moment / count[:, None, None] + 1e-9 * np.eye(moments.shape[1]), count, few

@@ -30,6 +30,7 @@ def left_over(
     noise: Noise,
     count: int,
     rng: np.random.Generator,
+    off: Floats | None = None,
 ) -> LeftOver:
     """Examine ``residual`` (n,), whose noise was estimated as ``noise``.
 
@@ -37,6 +38,9 @@ def left_over(
     surrogates vary (of channels: the one that varies most), and by more than the floor squared;
     and its own past must predict a part. By chance that happens to any of all sensors in 5 %
     (Sidak 1967).
+
+    ``off`` (n, m): draws of what the twin itself may be off by. Floors say what is usual in one
+    channel; of many, the one that is off most is farther off than that by chance.
     """
     drawn = np.concatenate(list(surrogates(noise, residual, count, rng)), axis=1)
     sensors = []
@@ -57,9 +61,14 @@ def left_over(
         scatter = np.array([samples.channels[i].noise_sd ** 2 for i in own])
         floor = np.array([samples.channels[i].floor ** 2 for i in own])
         largest = float(np.quantile(spread.max(axis=0), chance))
+        usual = scatter * largest + floor
+        if off is not None:
+            squared = np.stack([np.mean(off[keep] ** 2, axis=0) for keep in rows])
+            worst = np.max((scatter[:, None] + squared) / usual[:, None], axis=0)
+            usual = usual * max(1.0, float(np.quantile(worst, chance)))
         together = float(np.quantile(counts @ (scatter[:, None] * spread), chance))
         whole = counts @ squares > together + counts @ floor
-        single = squares > scatter * largest + floor
+        single = squares > usual
         conspicuous = own if whole else [i for i, one in zip(own, single, strict=True) if one]
         if conspicuous and _order(noise, conspicuous) > _PREDICTABLE:
             sensors.append(sensor)

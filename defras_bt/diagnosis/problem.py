@@ -99,8 +99,8 @@ class Tangent:
         return {n: float(np.clip(v, *bounds[n])) if n in bounds else v for n, v in found.items()}
 
 
-class Problem(Protocol):
-    """Data of one or more trajectories beside a twin that predicts them."""
+class Linearised(Protocol):
+    """A twin that knows how its predictions change with each candidate cause."""
 
     @property
     def samples(self) -> Samples: ...
@@ -108,15 +108,19 @@ class Problem(Protocol):
     @property
     def candidates(self) -> tuple[Candidate, ...]: ...
 
-    def residual(self, model: Extension) -> Floats:
-        """Measured minus predicted (n,) with the effects of ``model``; NaN where nothing is
-        compared. Where the twin cannot follow ``model`` at all, every entry is NaN."""
-        ...
-
     def tangents(self, model: Extension, candidate: Candidate) -> Sequence[Tangent]:
         """How predictions change if ``candidate`` is added to (or, where ``model`` has it, moved
         in) ``model``: one where the null point has a derivative, several secants where it has
         none."""
+        ...
+
+
+class Problem(Linearised, Protocol):
+    """Data of one or more trajectories beside a twin that predicts them."""
+
+    def residual(self, model: Extension) -> Floats:
+        """Measured minus predicted (n,) with the effects of ``model``; NaN where nothing is
+        compared. Where the twin cannot follow ``model`` at all, every entry is NaN."""
         ...
 
 

@@ -24,10 +24,11 @@ _BEHIND = 0.3
 """Of the named cause's statistic: rivals below it on the linearised model are not fitted."""
 
 
-def rivals(search: Search, key: str, confounding: Confounding, told: Progress) -> tuple[str, ...]:
-    """Candidates that cannot be told from the accepted cause ``key`` with this data."""
+def rivals(search: Search, key: str, confounding: Confounding, told: Progress) -> dict[str, Fit]:
+    """Candidates that cannot be told from the accepted cause ``key`` with this data, with the
+    models in which they take its place."""
     fits = _rival_fits(search, key, confounding, told)
-    return tuple(rival for rival, fit in fits.items() if not _rejected(search, key, rival, fit))
+    return {rival: fit for rival, fit in fits.items() if not _rejected(search, key, rival, fit)}
 
 
 def _rival_fits(

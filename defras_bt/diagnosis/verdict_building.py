@@ -76,11 +76,7 @@ def _verdict(found: Findings, before: Floats, after: Floats) -> Verdict:
     left = None if removed is None else 1.0 - removed
     too_much = not accepted or (left is not None and left > search.settings.outside_share)
     outside = bool(found.left.sensors) and too_much
-    # Other places of the same effect are not another cause.
-    ambiguous = {
-        key: [r for r in found.rivals.get(key, ()) if _effect(r) != _effect(key)]
-        for key in accepted
-    }
+    ambiguous = found.ambiguous()
     name: VerdictName = "nothing"
     if outside:
         name = "outside"
@@ -102,6 +98,7 @@ def _verdict(found: Findings, before: Floats, after: Floats) -> Verdict:
             found.further.get("new_grasp"),
         ),
         unexplained_share=left,
+        proposed_motion=None if outside else found.proposed,
         warnings=_warnings(found, outside),
     )
 
@@ -125,7 +122,7 @@ def _cause(found: Findings, key: str) -> Cause:
         candidate.site,
         estimates,
         found.gains.get(key, 0.0),
-        found.rivals.get(key, ()),
+        tuple(found.rivals.get(key, ())),
     )
 
 

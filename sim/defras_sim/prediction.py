@@ -48,6 +48,11 @@ class Prediction:
         lost = np.full(shape, np.nan)
         return np.stack([s.surface.vertices_m if s.converged else lost for s in self.states])
 
+    @property
+    def nbytes(self) -> int:
+        """About how much memory it takes: the shapes, and once more where they were asked for."""
+        return sum(s.nodes_m.nbytes + 2 * s.surface.vertices_m.nbytes for s in self.states)
+
     def force_n(self, arm: str) -> Floats:
         """Force (m, 3) of a jaw on the tissue; 0 without a grip, NaN where the state is stale."""
         none, lost = np.zeros(3), np.full(3, np.nan)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from defras_bt.diagnosis.motions import PlannedMotion, Strengths
 from defras_bt.diagnosis.noise import tolerances
 from defras_bt.diagnosis.problem import Candidate, Covariate, Tangent
 from defras_bt.diagnosis.quality import DataQuality
@@ -16,6 +17,8 @@ from defras_bt.diagnosis.twins.tissue_cells import AssignedCloud
 from defras_bt.diagnosis.twins.tissue_frames import TissueFrames
 from defras_bt.diagnosis.twins.tissue_models import LedModels, key_of
 from defras_bt.diagnosis.twins.tissue_part import KeyShapes, TissuePart
+from defras_bt.diagnosis.twins.tissue_planned import Planner
+from defras_bt.diagnosis.twins.tissue_plans import plans
 from defras_bt.diagnosis.twins.tissue_samples import samples_of
 from defras_bt.diagnosis.twins.tissue_signals import Layout
 from defras_bt.diagnosis.twins.tissue_systematic import systematic_errors
@@ -26,8 +29,8 @@ from defras_sim.effects.effect import Extension, Values
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 
-_REMEMBERED = 40
-"""Residuals that are kept."""
+_REMEMBERED = 400
+"""Residuals that are kept; one takes about 0.1 MB."""
 
 
 class TissueProblem:
@@ -145,6 +148,24 @@ class TissueProblem:
             for frames in (plain, extended)
         )
         return (warnings_remark(before, after),)
+
+    @property
+    def force_limit_n(self) -> float:
+        """The scene's threshold; where it has none, as much as the plain model says that was
+        exerted in the recordings."""
+        limit = self.scene.thresholds.force_n
+        return max(f.largest_force_n for f in self._models.plain) if limit is None else limit
+
+    def planned_motions(
+        self, model: Extension, strengths: Strengths, rng: np.random.Generator
+    ) -> Sequence[PlannedMotion]:
+        """See :class:`defras_bt.diagnosis.motions.Planning`; those that the twin can follow."""
+        planner = Planner(self.scene, self.layout, self.samples, self._jobs)
+        whole = self._models.whole(model)
+        asked = [c for c in self.candidates if c.key in strengths]
+        tried = plans(self.scene, self.trajectories)
+        found = (planner.planned(plan, whole, asked, strengths, rng) for plan in tried)
+        return tuple(motion for motion in found if motion is not None)
 
     def frames(self, model: Extension) -> tuple[TissueFrames, ...] | None:
         """What ``model`` says of the frames of every trajectory; None where it cannot."""

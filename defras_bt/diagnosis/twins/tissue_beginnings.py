@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from defras_sim.effects.effect import EffectParameter
+from defras_bt.diagnosis.problem import Candidate
+from defras_sim.effects.effect import EffectParameter, Extension
 
 LATE_STEPS = (1.0, 3.0)
 """Of a delay's step: late frames are not on a straight line for long."""
@@ -23,3 +24,15 @@ PROMISING = 0.02
 def inwards(p: EffectParameter, value: float) -> float:
     """The parameter's step, turned round where it would leave the bounds."""
     return p.step if value + p.step <= p.upper else -p.step
+
+
+def standing(model: Extension, candidate: Candidate) -> dict[str, float]:
+    """Where the candidate's free parameters stand in ``model``."""
+    values = model.get(candidate.effect.name, {})
+    return {p.name: float(values.get(p.name, p.null)) for p in candidate.free}
+
+
+def is_there(model: Extension, candidate: Candidate) -> bool:
+    """Whether ``model`` has the candidate already."""
+    values = model.get(candidate.effect.name, {})
+    return any(values.get(p.name, p.null) != p.null for p in candidate.free if p.strength)

@@ -37,6 +37,12 @@ class TissueFrames:
     tips_m: Mapping[str, Floats]
     corrected: Callable[[Floats], Floats]
 
+    @property
+    def largest_force_n(self) -> float:
+        """Of any jaw in any frame that the model could follow."""
+        forces = [np.linalg.norm(force, axis=1) for force in self.forces_n.values()]
+        return float(max((np.nanmax(f, initial=0.0) for f in forces), default=0.0))
+
 
 def before_the_camera(model: Extension) -> dict[str, Values]:
     """The effects of ``model`` that change what tissue and arms do, less those at null."""

@@ -23,7 +23,9 @@ from defras_sim.effects.effect import Effect, Extension, Values
 from defras_sim.prediction import Prediction
 from defras_sim.scene import Scene
 
-_REMEMBERED = 12
+_REMEMBERED_BYTES = 500_000_000
+"""Of shapes that are kept: of a default mesh along 10 s, about fifty predictions, more than any
+round of full fits goes back to."""
 
 
 class LedModels:
@@ -99,12 +101,22 @@ class LedModels:
         count = len(self._trajectories)
         for number, key in enumerate(models):
             self._remember(key, found[count * number : count * (number + 1)])
+        self._forget(len(models))
 
     def _remember(self, key: str, predictions: Sequence[Prediction | None]) -> None:
         followed = tuple(p for p in predictions if p is not None)
         self._led[key] = followed if len(followed) == len(predictions) else None
-        while len(self._led) > _REMEMBERED:
-            self._led.popitem(last=False)
+
+    def _forget(self, newest: int) -> None:
+        """Let go of models that were not asked for longest, where all take too much memory; never
+        of the ``newest``, which are about to be asked for."""
+        sizes = {key: sum(p.nbytes for p in led or ()) for key, led in self._led.items()}
+        total = sum(sizes.values())
+        for key in list(self._led)[: max(len(self._led) - newest, 0)]:
+            if total <= _REMEMBERED_BYTES:
+                break
+            total -= sizes[key]
+            del self._led[key]
 
     def _begin(
         self, effects: Mapping[str, Effect]

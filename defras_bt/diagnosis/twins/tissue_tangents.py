@@ -9,7 +9,6 @@ them. What cannot be differentiated is led along once with the effect and once w
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,29 +17,19 @@ from defras_bt.diagnosis.twins.tissue_beginnings import (
     LATE_STEPS,
     ONSET,
     ONSETS,
-    PLACES_TRIED,
-    PROMISING,
     SLACK,
-    STRONG,
     inwards,
+    is_there,
+    standing,
 )
 from defras_bt.diagnosis.twins.tissue_first_jobs import first_jobs, key_shapes
 from defras_bt.diagnosis.twins.tissue_part import KeyShapes, TissuePart, with_values
-from defras_bt.diagnosis.twins.tissue_pass import KeyShape, PassJob
 from defras_bt.diagnosis.twins.tissue_passes import run_passes
+from defras_bt.diagnosis.twins.tissue_repeats import Wanted, repeats, wanted_of
 from defras_sim.effects.effect import Extension
 from defras_sim.effects.tissue_effect import TissueEffect
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
-
-
-@dataclass(frozen=True)
-class _Repeat:
-    """Keyframes of every trajectory, by a model with the effect at ``at`` plus ``step``."""
-
-    at: dict[str, float]
-    step: dict[str, float]
-    shapes: Sequence[Sequence[KeyShape | None]]
 
 
 class TissueTangents:
@@ -55,15 +44,33 @@ class TissueTangents:
         tolerance: Floats,
         jobs: int,
         shapes: Sequence[KeyShapes] = (),
+        wanted: Sequence[Wanted] | None = None,
     ) -> None:
         """``tolerance`` (rows,): what is small in each row. ``jobs`` processes work at once.
-        ``shapes`` of every trajectory, where the model was led along already."""
+        ``shapes`` of every trajectory, where the model was led along already. ``wanted``: what is
+        led along in full; where not given, what derivatives do not tell enough of."""
         self._scene, self._model, self._parts = scene, model, tuple(parts)
-        self._tolerance = tolerance
         self._effects = {c.effect.name: c.effect for c in candidates}
-        self._repeats: dict[str, list[_Repeat]] = {}
         self._shapes = list(shapes) or self._led_along(jobs)
-        self._try_in_full(candidates, jobs)
+        if wanted is None:
+            wanted = [
+                one
+                for candidate in candidates
+                if isinstance(candidate.effect, TissueEffect)
+                for one in wanted_of(
+                    candidate, model, tuple(self._differentiated(candidate)), self._parts, tolerance
+                )
+            ]
+        self._repeats = repeats(scene, model, self._parts, candidates, wanted, jobs)
+
+    @property
+    def largest_force_n(self) -> float:
+        """Of any jaw at a keyframe, with any effect that was led along in full."""
+        led = [shapes.plain for shapes in self._shapes]
+        led += [shapes for repeat in self._repeats for shapes in repeat.shapes]
+        solved = [shape for shapes in led for shape in shapes if shape is not None]
+        forces = [float(np.linalg.norm(f)) for shape in solved for f in shape.forces_n.values()]
+        return max(forces, default=0.0)
 
     def of(self, candidate: Candidate) -> tuple[Tangent, ...]:
         """All ways in which ``candidate`` could begin, or go on where the model has it."""
@@ -88,10 +95,10 @@ class TissueTangents:
         self, candidate: Candidate, change: Callable[[str, Mapping[str, float]], Floats]
     ) -> Tangent:
         """One column for each free parameter, a step of it away from where it stands."""
-        at = self._standing(candidate)
+        at = standing(self._model, candidate)
         steps, columns = [], []
         for p in candidate.free:
-            if not p.strength and not self._has(candidate):
+            if not p.strength and not is_there(self._model, candidate):
                 continue
             step = inwards(p, at[p.name])
             columns.append(change(candidate.effect.name, {**at, p.name: at[p.name] + step}))
@@ -99,7 +106,7 @@ class TissueTangents:
         return Tangent(at, tuple(steps), np.stack(columns, axis=1))
 
     def _late(self, candidate: Candidate) -> Iterator[Tangent]:
-        at = self._standing(candidate)
+        at = standing(self._model, candidate)
         effect = candidate.effect.name
         for p in candidate.free:
             for times in LATE_STEPS:
@@ -110,9 +117,9 @@ class TissueTangents:
             raise ValueError(f"{effect} has no free parameter")
 
     def _carried(self, candidate: Candidate) -> Iterator[Tangent]:
-        name, at = candidate.effect.name, self._standing(candidate)
+        name, at = candidate.effect.name, standing(self._model, candidate)
         onset = ONSET.get(name)
-        if self._has(candidate) or (onset is None and name not in SLACK):
+        if is_there(self._model, candidate) or (onset is None and name not in SLACK):
             yield self._smooth(candidate, self._carry)
             return
         (p, *_) = [p for p in candidate.free if p.strength]
@@ -126,7 +133,7 @@ class TissueTangents:
     def _differentiated(self, candidate: Candidate) -> Iterator[Tangent]:
         """One tangent for each place at which the effect could begin."""
         effect = candidate.effect
-        standing = self._standing(candidate)
+        begun_at = standing(self._model, candidate)
         free = {p.name: p for p in candidate.free}
         per_part = [
             part.differentiated(shapes, effect.name)
@@ -138,7 +145,7 @@ class TissueTangents:
                 if parameter in free:
                     everywhere.setdefault(where, {})[parameter] = None
         for where, parameters in everywhere.items():
-            at = {**standing, **{n: v for n, v in where if n in free}}
+            at = {**begun_at, **{n: v for n, v in where if n in free}}
             blocks = {
                 parameter: self._joined(
                     [found.get((effect.name, parameter, where)) for found in per_part]
@@ -151,7 +158,7 @@ class TissueTangents:
                 axis=1,
             )
             onset = ONSET.get(effect.name)
-            if onset is None or self._has(candidate):
+            if onset is None or is_there(self._model, candidate):
                 yield Tangent(at, steps, columns)
                 continue
             for start in self._onsets_s():
@@ -164,14 +171,16 @@ class TissueTangents:
                 yield Tangent({**at, onset: start}, steps, columns * begun[:, None])
 
     def _repeated(self, candidate: Candidate) -> Iterator[Tangent]:
-        for repeat in self._repeats.get(candidate.key, ()):
+        for repeat in self._repeats:
+            if repeat.wanted.key != candidate.key:
+                continue
             blocks = [
                 part.repeated(shapes.plain, other).ravel()
                 for part, shapes, other in zip(
                     self._parts, self._shapes, repeat.shapes, strict=True
                 )
             ]
-            yield Tangent(repeat.at, (repeat.step,), np.concatenate(blocks)[:, None])
+            yield Tangent(repeat.wanted.at, (repeat.wanted.step,), np.concatenate(blocks)[:, None])
 
     def _led_along(self, jobs: int) -> list[KeyShapes]:
         """The model led along every trajectory: with derivatives, and with grips aside."""
@@ -183,60 +192,6 @@ class TissueTangents:
             )
         ]
         return key_shapes(run_passes(work, self._effects, jobs), len(self._parts))
-
-    def _try_in_full(self, candidates: Sequence[Candidate], jobs: int) -> None:
-        """Lead models along that have an effect which derivatives do not tell enough of."""
-        wanted: list[tuple[str, dict[str, float], dict[str, float]]] = []
-        work: list[PassJob] = []
-        for candidate in candidates:
-            if not isinstance(candidate.effect, TissueEffect):
-                continue
-            known = tuple(self._differentiated(candidate))
-            (p, *_) = [p for p in candidate.free if p.strength]
-            if not known:
-                begun = [self._standing(candidate)]
-                size = inwards(p, begun[0][p.name])
-            elif candidate.effect.name in STRONG and not self._has(candidate):
-                begun = [dict(tangent.at) for tangent in self._best(known)]
-                size = STRONG[candidate.effect.name] - p.null
-            else:
-                continue
-            for at in begun:
-                changed = with_values(
-                    self._model, candidate.effect.name, {**at, p.name: at[p.name] + size}
-                )
-                wanted.append((candidate.key, at, {p.name: size}))
-                work += [
-                    PassJob(
-                        self._scene,
-                        changed,
-                        part.trajectory,
-                        part.keyframes.chosen,
-                        derivatives=False,
-                    )
-                    for part in self._parts
-                ]
-        found = run_passes(work, self._effects, jobs)
-        count = len(self._parts)
-        for number, (key, at, step) in enumerate(wanted):
-            shapes = found[count * number : count * (number + 1)]
-            self._repeats.setdefault(key, []).append(_Repeat(at, step, shapes))
-
-    def _best(self, tangents: Sequence[Tangent]) -> list[Tangent]:
-        """Those along which the residual would fall most."""
-        scale = self._joined(
-            [np.repeat(self._tolerance[:, None], part.shape[1], axis=1) for part in self._parts]
-        )
-        residual = np.nan_to_num(self._over_parts(lambda part, _: part.residual) / scale)
-
-        def gain(tangent: Tangent) -> float:
-            column = np.nan_to_num(tangent.columns[:, 0] / scale)
-            along = max(float(column @ residual), 0.0)
-            return along**2 / max(float(column @ column), 1e-12)
-
-        worth = PROMISING * float(residual @ residual)
-        promising = [tangent for tangent in tangents if gain(tangent) > worth]
-        return sorted(promising, key=gain, reverse=True)[:PLACES_TRIED]
 
     def _onsets_s(self) -> list[float]:
         """Times spread over all in which tissue is held."""
@@ -255,23 +210,13 @@ class TissueTangents:
         """Change (n,) per unit of those free parameters of a candidate that the model has, of which
         it is known without leading anything along again."""
         found: dict[str, Floats] = {}
-        if not self._has(candidate):
+        if not is_there(self._model, candidate):
             return found
         for tangent in self.of(candidate):
             for step, column in zip(tangent.steps, tangent.columns.T, strict=True):
                 ((name, size),) = step.items()
                 found[name] = column / size
         return found
-
-    def _standing(self, candidate: Candidate) -> dict[str, float]:
-        """Where the candidate's free parameters stand in the model."""
-        values = self._model.get(candidate.effect.name, {})
-        return {p.name: float(values.get(p.name, p.null)) for p in candidate.free}
-
-    def _has(self, candidate: Candidate) -> bool:
-        """Whether the model has the candidate already."""
-        values = self._model.get(candidate.effect.name, {})
-        return any(values.get(p.name, p.null) != p.null for p in candidate.free if p.strength)
 
     def _over_parts(self, change: Callable[..., Floats]) -> Floats:
         blocks = [

@@ -1,0 +1,120 @@
+"""Effects of the tissue that derivatives do not tell enough of, led along in full.
+
+Some have no derivative where they begin. Of others it says little: a soft spring under tissue that
+is lifted far pulls ever more, a firm one holds it. Those are tried at a strength of their own, at
+the places where their derivatives explain most of the residual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from defras_bt.diagnosis.problem import Candidate, Tangent
+from defras_bt.diagnosis.twins.tissue_beginnings import (
+    PLACES_TRIED,
+    PROMISING,
+    STRONG,
+    inwards,
+    is_there,
+    standing,
+)
+from defras_bt.diagnosis.twins.tissue_part import TissuePart, with_values
+from defras_bt.diagnosis.twins.tissue_pass import KeyShape, PassJob
+from defras_bt.diagnosis.twins.tissue_passes import run_passes
+from defras_sim.effects.effect import Effect, Extension
+from defras_sim.geometry import Floats
+from defras_sim.scene import Scene
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A candidate by ``key`` to be led along ``step`` farther than ``at``, by parameter."""
+
+    key: str
+    at: Mapping[str, float]
+    step: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """Keyframes of every trajectory, by a model with what is ``wanted``."""
+
+    wanted: Wanted
+    shapes: Sequence[Sequence[KeyShape | None]]
+
+
+def wanted_of(
+    candidate: Candidate,
+    model: Extension,
+    known: Sequence[Tangent],
+    parts: Sequence[TissuePart],
+    tolerance: Floats,
+) -> Iterator[Wanted]:
+    """In which ways ``candidate``, an effect of the tissue, should be led along beside ``model``.
+
+    ``known``: its beginnings that have derivatives. ``tolerance`` (rows,): what is small in each
+    row.
+    """
+    (p, *_) = [p for p in candidate.free if p.strength]
+    if not known:
+        at = standing(model, candidate)
+        yield Wanted(candidate.key, at, {p.name: inwards(p, at[p.name])})
+    elif candidate.effect.name in STRONG and not is_there(model, candidate):
+        step = {p.name: STRONG[candidate.effect.name] - p.null}
+        for tangent in _best(known, parts, tolerance):
+            yield Wanted(candidate.key, dict(tangent.at), step)
+
+
+def repeats(
+    scene: Scene,
+    model: Extension,
+    parts: Sequence[TissuePart],
+    candidates: Sequence[Candidate],
+    wanted: Sequence[Wanted],
+    jobs: int,
+) -> list[Repeat]:
+    """Models with what is ``wanted`` of ``candidates``, led along on ``jobs`` processes."""
+    effect = {candidate.key: candidate.effect for candidate in candidates}
+    work = [
+        PassJob(
+            scene,
+            with_values(model, effect[one.key].name, _there(one)),
+            part.trajectory,
+            part.keyframes.chosen,
+            derivatives=False,
+        )
+        for one in wanted
+        for part in parts
+    ]
+    known: dict[str, Effect] = {each.name: each for each in effect.values()}
+    found = run_passes(work, known, jobs)
+    count = len(parts)
+    return [
+        Repeat(one, found[count * number : count * (number + 1)])
+        for number, one in enumerate(wanted)
+    ]
+
+
+def _there(wanted: Wanted) -> dict[str, float]:
+    moved = {name: wanted.at[name] + change for name, change in wanted.step.items()}
+    return {**wanted.at, **moved}
+
+
+def _best(
+    tangents: Sequence[Tangent], parts: Sequence[TissuePart], tolerance: Floats
+) -> list[Tangent]:
+    """Those along which the residual would fall most."""
+    scale = np.concatenate([np.repeat(tolerance, part.shape[1]) for part in parts])
+    residual = np.nan_to_num(np.concatenate([part.residual.ravel() for part in parts]) / scale)
+
+    def gain(tangent: Tangent) -> float:
+        column: Floats = np.nan_to_num(tangent.columns[:, 0] / scale)
+        along = max(float(column @ residual), 0.0)
+        return along**2 / max(float(column @ column), 1e-12)
+
+    worth = PROMISING * float(residual @ residual)
+    promising = [tangent for tangent in tangents if gain(tangent) > worth]
+    return sorted(promising, key=gain, reverse=True)[:PLACES_TRIED]
