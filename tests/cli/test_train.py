@@ -41,3 +41,16 @@ def test_a_run_with_weights_that_are_not_there(defras: Defras, tmp_path: Path) -
     code, _, err = defras("run", "demo", "--weights", str(tmp_path))
     assert code == 2
     assert f"{tmp_path} holds no weights" in err
+
+
+@pytest.mark.parametrize(
+    ("tree", "said"), [("fras", "asks no network"), ("defras", "asks sequence")]
+)
+def test_a_run_with_weights_that_its_tree_does_not_ask(
+    defras: Defras, tmp_path: Path, tree: str, said: str
+) -> None:
+    (tmp_path / "banet.json").write_text("{}")
+    code, _, err = defras("run", "demo", "--tree", tree, "--weights", str(tmp_path))
+    assert code == 2
+    assert "weights of banet" in err
+    assert f"the tree {tree} {said}" in err

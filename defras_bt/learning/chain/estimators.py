@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from typing import Literal
 
@@ -11,6 +12,14 @@ from defras_bt.learning.networks.own_weights import OwnWeights
 
 EstimatorName = Literal["inverse", "banet", "sequence", "chain"]
 ESTIMATORS: tuple[EstimatorName, ...] = ("inverse", "banet", "sequence", "chain")
+NetworkName = Literal["banet", "sequence"]
+NETWORK_OF: Mapping[EstimatorName, NetworkName | None] = {
+    "inverse": None,
+    "banet": "banet",
+    "sequence": "sequence",
+    "chain": "sequence",
+}
+"""Which network each estimator asks."""
 
 
 @cache
@@ -22,7 +31,8 @@ def estimator(name: EstimatorName, own: OwnWeights | None = None) -> AttachmentE
     Raises:
         NoWeights: the weights of a network are missing, or not what their card says.
     """
-    if name == "inverse":
+    network = NETWORK_OF[name]
+    if network is None:
         return InverseEstimator()
     from defras_bt.learning.chain.chain import ChainEstimator
     from defras_bt.learning.networks.estimator import NetworkEstimator
@@ -30,6 +40,5 @@ def estimator(name: EstimatorName, own: OwnWeights | None = None) -> AttachmentE
     from defras_bt.learning.networks.weights import SHIPPED, read_weights
 
     folder = SHIPPED if own is None else own.folder
-    if name == "chain":
-        return ChainEstimator((proposer(read_weights("sequence", folder)),))
-    return NetworkEstimator(proposer(read_weights(name, folder)))
+    asked = proposer(read_weights(network, folder))
+    return ChainEstimator((asked,)) if name == "chain" else NetworkEstimator(asked)
