@@ -17,6 +17,12 @@ from defras_bt.cli.errors import OUTCOME_CODES, ExitCode, UserError
 from defras_bt.cli.files import find, find_scene, folder_for
 from defras_bt.cli.interrupts import Interrupts
 from defras_bt.cli.plan import rehearsed, tell
+from defras_bt.cli.run_requirements import (
+    require_asked,
+    require_no_trial,
+    require_safe,
+    require_same_set_up,
+)
 from defras_bt.executive.deadline import LONGEST_RECOVERY_S, interrupting
 from defras_bt.executive.operation import (
     ROBOT_WORLD,
@@ -27,15 +33,11 @@ from defras_bt.executive.operation import (
     random_generators,
 )
 from defras_bt.executive.operator_desk import OperatorDesk
-from defras_bt.executive.proof.prover import prove
 from defras_bt.executive.substitution import NOTHING_SUBSTITUTED, read_substitutes
 from defras_bt.executive.tree_file import read_tree
-from defras_bt.executive.tree_spec import TreeSpec
 from defras_bt.faults.faults import NO_FAULTS, FaultInjection
 from defras_bt.faults.file import read_faults
-from defras_bt.learning.chain.estimators import NETWORK_OF
 from defras_bt.learning.networks.own_weights import OwnWeights
-from defras_bt.learning.nodes import LearnParameters
 from defras_bt.planning.preparation import needs_plan
 from defras_bt.recording.bag import BagRecorder
 from defras_bt.recording.composite import RecordingFailed
@@ -46,7 +48,6 @@ from defras_bt.recording.report import ReportRecorder
 from defras_bt.recording.run_file import STREAM_FILE
 from defras_bt.recording.summary import SummaryRecorder
 from defras_bt.recording.timeline import TimelineRecorder
-from defras_sim.scene import Scene
 
 LEFT = ("run.rrd", "recording.mcap", DECISIONS_FILE, "run.json", "report.html")
 """The files that a run leaves in its folder; on a robot the log of its set-points as well."""
@@ -108,20 +109,20 @@ def run(
     scene_file, believed = find_scene(scene)
     laboratory = None
     if world == ROBOT_WORLD:
-        _require_no_trial(actual=actual, substitute=substitute, faults=faults)
+        require_no_trial(actual=actual, substitute=substitute, faults=faults)
         laboratory = checked_laboratory(setup, believed)
     elif setup is not None:
         raise UserError(f"--setup {setup}: only --world {ROBOT_WORLD} has a laboratory")
     actual_file, truth = find_scene(actual) if actual is not None else (None, believed)
-    _require_same_set_up(believed, truth)
+    require_same_set_up(believed, truth)
     tree_file = find(tree, "trees")
     tree_spec = read_tree(tree_file)
-    _require_safe(tree_spec, tree)
+    require_safe(tree_spec, tree)
     substitutes = NOTHING_SUBSTITUTED if substitute is None else read_substitutes(substitute)
     substituted = substitutes.paths(tree_spec)
     own_weights = None if weights is None else OwnWeights.of(weights)
     if own_weights is not None:
-        _require_asked(own_weights, tree_spec)
+        require_asked(own_weights, tree_spec)
     injected = NO_FAULTS
     if faults is not None:
         injected = read_faults(find(faults, "sim/faults"), believed.arms)
@@ -253,64 +254,3 @@ def _require_unused(out: Path, *, replace: bool) -> None:
 def _there(out: Path) -> list[str]:
     """Which of the files that runs leave are in a folder."""
     return [name for name in (*LEFT, STREAM_FILE) if (out / name).exists()]
-
-
-def _require_safe(tree: TreeSpec, named: str) -> None:
-    """A tree whose guards do not stop every motion in time is not run, in no world."""
-    proof = prove(tree)
-    if not proof.holds:
-        claims = "; ".join(refutation.claim.statement for refutation in proof.refuted)
-        raise UserError(
-            f"--tree {named}: not run, because it is not proved that {claims}. "
-            f"`defras tree prove {named}` shows the ticks that break it and the node at fault"
-        )
-
-
-def _require_asked(own: OwnWeights, tree: TreeSpec) -> None:
-    """Weights that no leaf of the tree asks are a mistake that nobody would notice."""
-    learns = {
-        spec.options.estimator
-        for _, spec in tree.root.walk()
-        if isinstance(spec.options, LearnParameters)
-    }
-    asked = {network for name in learns if (network := NETWORK_OF[name]) is not None}
-    there = [name for name, _ in own.cards]
-    if asked.isdisjoint(there):
-        does = f"asks {' and '.join(sorted(asked))}" if asked else "asks no network"
-        raise UserError(
-            f"--weights {own.folder}: it holds weights of {' and '.join(there)}, but the tree "
-            f"{tree.name} {does}; see `estimator` of LearnAttachments"
-        )
-
-
-def _require_no_trial(**options: str | Path | None) -> None:
-    """Nothing is tried out on a robot.
-
-    Raises:
-        UserError: an option of simulated worlds was given.
-    """
-    for option, given in options.items():
-        if given is not None:
-            raise UserError(
-                f"--{option} {given}: in simulated worlds ({', '.join(WORLDS)}) only; a robot's "
-                "patient is what it is"
-            )
-
-
-def _require_same_set_up(believed: Scene, truth: Scene) -> None:
-    """What the executive takes for granted: one patient, one clock, the same arms.
-
-    Raises:
-        UserError: the actual scene is of another set-up.
-    """
-    if truth.hole_counts != believed.hole_counts:
-        raise UserError(
-            f"{believed.name} and {truth.name} have different holes "
-            f"({believed.hole_counts} and {truth.hole_counts}): they are not one patient"
-        )
-    for key in ("tick_s", "arms"):
-        if getattr(truth, key) != getattr(believed, key):
-            raise UserError(
-                f"{believed.name} and {truth.name} differ in {key}; an actual scene may differ "
-                "from the believed one in the patient, not in the set-up"
-            )
