@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from defras_bt.benchmark.generated_scenes import GeneratedScenes
 from defras_sim.resources import resource
 from defras_sim.scene import Scene, load_scene
-from defras_sim.scene_generator import Relation, generate_scene
+from defras_sim.scene_generator import Relation
 
 SIMULATED = tuple(f"sim{number}" for number in range(1, 9))
 SETUPS = ("A", "B", "C")
@@ -28,15 +29,14 @@ class Case:
     actual: str | None
     seed: int | None = None
 
-    def scenes(self) -> tuple[Scene, Scene]:
-        """(believed, actual). Generating them can take a minute.
+    def scenes(self, generated: GeneratedScenes | None = None) -> tuple[Scene, Scene]:
+        """(believed, actual). Generating them can take a minute, unless ``generated`` has them.
 
         Raises:
             NoScene: the seed gives no scene that can be exposed.
         """
         if self.seed is not None:
-            drawn = generate_scene(self.seed, self.relation)
-            return drawn.believed.scene, drawn.actual.scene
+            return (generated or GeneratedScenes()).pair(self.seed, self.relation)
         return shipped(self.believed or ""), shipped(self.actual or "")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from joblib import Parallel, delayed
 
 from defras_bt.benchmark.cases import Case, configurations, shipped
 from defras_bt.benchmark.force_error import ForceError
+from defras_bt.benchmark.generated_scenes import GeneratedScenes
 from defras_bt.executive.executive import ExecutiveFailed
 from defras_bt.executive.operation import Operation, operate
 from defras_bt.executive.tree_file import read_tree
@@ -92,26 +94,62 @@ def run_cases(
     seed: int = 0,
     jobs: int = 2,
     done: frozenset[str] = frozenset(),
+    scenes: Path | None = None,
 ) -> Iterator[Row]:
-    """Run every case with every one of ``runs``, except those in ``done`` (see :attr:`Row.key`)."""
+    """Run every case with every one of ``runs``, except those in ``done`` (see :attr:`Row.key`).
+
+    ``scenes``: folder in which generated patients are kept.
+    """
     missing = [
-        (case, [run for run in runs if f"{case.name} {case.relation} {run}" not in done])
+        (case, tuple(run for run in runs if f"{case.name} {case.relation} {run}" not in done))
         for case in cases
     ]
     work = (
-        delayed(_rows_of)(case, tuple(wanted), world, preparations, seed)
-        for case, wanted in missing
-        if wanted
+        delayed(_rows_of)(together, world, preparations, seed, scenes)
+        for together in _by_patient([(case, wanted) for case, wanted in missing if wanted])
     )
     for rows in Parallel(n_jobs=jobs, return_as="generator_unordered")(work):
         yield from rows
 
 
+Wanted = tuple[Case, tuple[str, ...]]
+"""A case, and the runs of it that are still missing."""
+
+
+def _by_patient(missing: Sequence[Wanted]) -> list[list[Wanted]]:
+    """Cases of one generated patient together: what is believed is then looked for once."""
+    together: dict[object, list[Wanted]] = {}
+    for number, (case, wanted) in enumerate(missing):
+        key = ("shipped", number) if case.seed is None else ("seed", case.seed)
+        together.setdefault(key, []).append((case, wanted))
+    return list(together.values())
+
+
 def _rows_of(
-    case: Case, runs: tuple[str, ...], world: str, preparations: Preparations, seed: int
+    together: Sequence[Wanted],
+    world: str,
+    preparations: Preparations,
+    seed: int,
+    scenes: Path | None,
+) -> list[Row]:
+    generated = GeneratedScenes(scenes)
+    return [
+        row
+        for case, runs in together
+        for row in _rows_of_case(case, runs, world, preparations, seed, generated)
+    ]
+
+
+def _rows_of_case(
+    case: Case,
+    runs: Sequence[str],
+    world: str,
+    preparations: Preparations,
+    seed: int,
+    generated: GeneratedScenes,
 ) -> list[Row]:
     try:
-        believed, actual = case.scenes()
+        believed, actual = case.scenes(generated)
     except NoScene as error:
         nothing = {"outcome": "no scene", "error": str(error)}
         return [Row(case.name, case.relation, run, nothing) for run in runs]

@@ -180,7 +180,14 @@ def _measure(
         bar.update(task, description="runs", total=len(wanted), completed=len(rows.done & wanted))
         console.print(f"epsilon: {2 * preparations.force_median_n:.2f} N", markup=False)
         for row in run_cases(
-            cases, runs, world, preparations, seed=seed, jobs=jobs, done=rows.done
+            cases,
+            runs,
+            world,
+            preparations,
+            seed=seed,
+            jobs=jobs,
+            done=rows.done,
+            scenes=out / "scenes",
         ):
             rows.add(row)
             bar.advance(task)

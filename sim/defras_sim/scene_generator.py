@@ -50,43 +50,50 @@ class GeneratedScene:
     actual: Solved
 
 
+Solver = Callable[[Scene], Solved | None]
+
+
 def generate_scene(
     seed: int,
     relation: Relation = "fewer",
     *,
     layout: str | None = None,
     tell: Callable[[str], None] = lambda sentence: None,
+    solver: Solver | None = None,
 ) -> GeneratedScene:
     """The first draw of ``seed`` that can be exposed as believed and as it really is.
 
-    ``tell`` hears what became of each draw: each costs some seconds of rehearsing.
+    ``tell`` hears what became of each draw: each costs some seconds of rehearsing. ``solver`` is
+    :func:`solve`, or remembers what that said.
 
     Raises:
         NoScene: no draw can be; another seed or layout may do.
     """
-    rng = np.random.default_rng(seed)
+    solver, rng = solver or solve, np.random.default_rng(seed)
     for number in range(1, _MOST_BELIEFS + 1):
         drawn = draw_believed(rng, name=f"seed{seed}", layout=layout)
         said = f"draw {number}: {drawn.description.removeprefix('Believed: ').removesuffix('.')}"
-        believed = solve(drawn)
+        believed = solver(drawn)
         if believed is None:
             tell(f"{said}: cannot be exposed")
             continue
         tell(f"{said}: can be exposed; looking for what is really there")
-        actual = solved_actual(believed, relation, rng)
+        actual = solved_actual(believed, relation, rng, solver)
         if actual is not None:
             return GeneratedScene(believed, actual)
         tell(f"{said}: nothing with {relation} attachments can be exposed")
     raise NoScene(f"seed {seed}: none of {_MOST_BELIEFS} draws can be exposed; try another seed")
 
 
-def solved_actual(believed: Solved, relation: Relation, rng: np.random.Generator) -> Solved | None:
+def solved_actual(
+    believed: Solved, relation: Relation, rng: np.random.Generator, solver: Solver | None = None
+) -> Solved | None:
     """An actual scene for ``believed`` that can be exposed; None where six draws gave none."""
     for _ in range(_MOST_ACTUALS):
         drawn = draw_actual(believed.scene, relation, rng)
         if relation == "equal":
             return Solved(drawn, believed.solution)
-        actual = solve(drawn)
+        actual = (solver or solve)(drawn)
         if actual is not None:
             return actual
     return None
