@@ -96,8 +96,9 @@ class Stream(Part):
     """The stream of set-points, and the limits that nothing sent ever breaks.
 
     ``reach_speed_m_s``: how fast arms reach at most, whatever the scene says. A dVRK's joints are
-    45 to 51 ms behind their commands (measured; arXiv 2406.07375): at 40 mm/s that is 2 mm, and an
-    arm 3 mm away from its set-point counts as one that does not follow.
+    45 to 51 ms behind their commands (measured; arXiv 2406.07375): at 30 mm/s the tip is up to
+    1.7 mm behind, 0.3 mm more for each period by which pose and set-point are apart, and an arm
+    3 mm away from its set-point counts as one that does not follow.
     ``step_m``, ``step_rad``: farthest between two set-points that follow each other.
     ``watchdog_s``: so long after a command motion stops by itself. ``realtime_priority``: of the
     process that streams, 1 to 99 for the system's real-time scheduler, 0 for none; without it the
@@ -106,7 +107,7 @@ class Stream(Part):
 
     rate_hz: Annotated[float, Field(ge=100, le=1000)] = 100.0
     speed_m_s: Annotated[float, Field(gt=0, le=0.2)] = 0.06
-    reach_speed_m_s: Annotated[float, Field(gt=0, le=0.2)] = 0.04
+    reach_speed_m_s: Annotated[float, Field(gt=0, le=0.2)] = 0.03
     acceleration_m_s2: Annotated[float, Field(gt=0, le=5)] = 1.0
     braking_m_s2: Annotated[float, Field(ge=0.2, le=50)] = 5.0
     turning_rad_s: Annotated[float, Field(gt=0, le=6)] = 1.0

@@ -213,8 +213,11 @@ class Executive:
         self._over_before = over
 
     def _tell_computed(self, took_s: float) -> None:
-        """Say why a robot stood still; the time of a simulated world does not pass meanwhile."""
-        if took_s > COMPUTED_S:
+        """Say why a robot stood still; the time of a simulated world does not pass meanwhile.
+
+        Before the first tick nothing moved anyway: much is loaded only then.
+        """
+        if self._tick > 0 and took_s > COMPUTED_S:
             self._board.tell(
                 "hold",
                 f"The arms held still for {took_s:.1f} s, until this was worked out.",

@@ -218,7 +218,7 @@ class TestRefusal:
         laboratory = checked_laboratory(setup.checked.with_name("lab.yaml"), scene)
         on_robot = slowed(scene, laboratory)
         assert scene.motion.reach_speed_m_s == 0.05
-        assert on_robot.motion.reach_speed_m_s == 0.04
+        assert on_robot.motion.reach_speed_m_s == 0.03
         assert on_robot.motion.tissue_speed_m_s == scene.motion.tissue_speed_m_s
 
     @pytest.mark.parametrize(
