@@ -16,7 +16,7 @@ from defras_bt.benchmark.cases import shipped
 from defras_bt.benchmark.diagnosis_cases import BoardCase, hidden_in_table
 from defras_bt.benchmark.hidden_draw import NULL, draw
 from defras_bt.benchmark.hidden_noise import NoiseSpectrum
-from defras_bt.benchmark.hidden_recording import ELEMENTS_XYZ, reality, record
+from defras_bt.benchmark.hidden_recording import reality, record
 from defras_bt.benchmark.hidden_tables import arm_table, coupon_table
 from defras_bt.diagnosis.baselines import BASELINES, baseline
 from defras_bt.diagnosis.engine import diagnose
@@ -32,7 +32,7 @@ from defras_sim.worlds.error import WorldError
 
 _BELIEVED = "sim1"
 _POINT, _OTHER_POINT = (2, 4), (4, 4)
-_COARSE_XYZ, _COARSE_REAL_XYZ = (4, 4, 1), (6, 6, 1)
+_COARSE_XYZ = (4, 4, 1)
 
 
 @dataclass(frozen=True)
@@ -97,8 +97,8 @@ class _Material:
 def board_rows(
     cases: Sequence[BoardCase], *, coarse: bool, baselines: bool, jobs: int
 ) -> Iterator[BoardRow]:
-    """A row for each case, as they end. ``coarse``: tissue on meshes of 4x4x1 (the model's) and
-    6x6x1 (reality's) elements, with nothing measured of other retractions."""
+    """A row for each case, as they end. ``coarse``: the model's tissue has 4x4x1 elements (reality
+    has as many as ever), and nothing is measured of other retractions."""
     work = (delayed(board_row)(case, coarse=coarse, baselines=baselines) for case in cases)
     yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(work)
 
@@ -199,7 +199,7 @@ def _retraction(
         script = draw(scene, NULL, case.seed + 7919 * number, point).script
         file = folder / f"measured_{number}.mcap"
         script = drawn[0].script if number == 0 else script
-        actual = reality(scene, hidden, elements_xyz=_COARSE_REAL_XYZ if coarse else ELEMENTS_XYZ)
+        actual = reality(scene, hidden)
         record(actual, script, NoiseSpectrum(), rng, file)
         run = read_recording(file, scene, None)
         return TissueProblem(scene, [run], candidates, jobs=1, to_score=number > 0)

@@ -73,9 +73,8 @@ def diagnosis(
         "Right: just what was hidden was named. Macro: the mean over causes. Intervals are those "
         "of 95 % (Clopper and Pearson). Removed: median share of the excess error, of what was "
         "named rightly, on data that was not fitted.",
-        "Tissue on 4x4x1 (model) and 6x6x1 (reality) elements."
-        if quick
-        else "Tissue on the model's default mesh, reality on 10x10x1 quadratic tetrahedra.",
+        f"Tissue on {'4x4x1 elements' if quick else 'the default mesh'} in the model, on 10x10x1 "
+        "times six quadratic tetrahedra in reality.",
     ]
     write_benchmark(out, "diagnosis", "What the diagnosis finds", tables, notes)
     file.unlink()

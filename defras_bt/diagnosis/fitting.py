@@ -23,6 +23,9 @@ _DIFFERENCE = 0.25
 """Of a parameter's step: wide enough to see past a solver's tolerance."""
 _SMALLEST_GAIN = 1e-3
 """Relative gain of a step after which a fit has arrived."""
+_NOTHING = 0.1
+"""Whitened squares that a step has to promise to be worth a prediction: a third of a standard
+error."""
 _FINEST = 0.2
 """Of a parameter's step: strides below it are left to derivatives."""
 
@@ -88,12 +91,15 @@ def refine(counted: CountedProblem, fit: Fit, noise: Noise, *, iterations: int) 
     model, residual, jacobian = fit.model, fit.residual, fit.jacobian.copy()
     damping = 1e-3
     loss = _loss(noise, residual)
-    for _ in range(iterations):
+    for number in range(iterations):
         step = _bounded_step(noise, residual, jacobian, damping, lower - place, upper - place)
         if np.abs(step).max() < 1e-4:
             break
         there = np.clip(place + step, lower, upper)
         if np.array_equal(there, place):  # at its bounds
+            break
+        promised = loss - _loss(noise, residual - jacobian @ (there - place))
+        if number and promised < _NOTHING:  # the first step also tells if derivatives are right
             break
         trial = _moved(fit, model, there)
         found = counted.residual(trial)

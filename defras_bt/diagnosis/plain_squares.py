@@ -42,7 +42,10 @@ def fit_plainly(search: Search) -> None:
     if not _promised(search, white):
         return
     for _ in range(_ROUNDS):
+        before = fit
         fit = refine(search.counted, fit, white, iterations=search.settings.iterations)
+        if fit.model == before.model:
+            break
         white = estimate_noise(fit.residual, search.samples, search.layout, orders.tolist())
     now = excess(search.held_out(search.fit, search.noise).residual, search.samples)
     plain = replace(search, fit=fit, fitted_with=white)
@@ -69,6 +72,8 @@ def _with_fresh_derivatives(search: Search, fit: Fit, white: Noise) -> Fit:
         widths = np.full(len(fit.free), _WIDTH)
         fresh = differentiate(search.counted, fit, widths)
         fit = refine(search.counted, fresh, white, iterations=search.settings.iterations)
+        if fit.model == fresh.model:
+            break
     return fit
 
 

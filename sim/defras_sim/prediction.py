@@ -30,13 +30,14 @@ class Prediction:
     """What tissue and arms do over a motion, at ``time_s`` (m,): its instants ``rows`` (m,).
 
     ``states`` are the tissue's, stale where the model could not follow. ``measured`` is by arm
-    where the encoders should say that its tip is (tissue_from_tip). Clouds stamped ``delay_s``
-    later, seen through ``camera``, show these states.
+    where the encoders should say that its tip is (tissue_from_tip), at the instants ``read`` (r,).
+    Clouds stamped ``delay_s`` later, seen through ``camera``, show these states.
     """
 
     rows: Integers
     time_s: Floats
     states: tuple[TissueState, ...]
+    read: Integers
     measured: Mapping[str, tuple[Pose, ...]]
     camera: CameraLayer
     delay_s: float
@@ -60,6 +61,11 @@ class Prediction:
             [s.grasp_forces_n.get(arm, none) if s.converged else lost for s in self.states]
         )
 
+    def force_between_n(self, arm: str, time_s: Floats) -> Floats:
+        """Force (k, 3) of a jaw on the tissue at other times (k,), linearly between instants."""
+        known = self.force_n(arm)
+        return np.stack([np.interp(time_s, self.time_s, known[:, axis]) for axis in range(3)], 1)
+
     def surface_shown(self, stamp_s: float) -> Surface:
         """The surface (vertices NaN where stale) that a cloud of this stamp shows.
 
@@ -78,11 +84,17 @@ class Prediction:
         return Surface(vertices_m, first.triangles, first.upper, first.rest_xy_m)
 
 
-def predict(scene: Scene, motion: RecordedMotion, rows: Integers | None = None) -> Prediction:
+def predict(
+    scene: Scene,
+    motion: RecordedMotion,
+    rows: Integers | None = None,
+    read: Integers | None = None,
+) -> Prediction:
     """What the twin of ``scene``, with the effects it adopts, does along ``motion``.
 
     The arms follow every instant; the tissue is solved at ``rows`` of them (all of them, where
-    none are given), around what clouds of their stamps show, and where a grip begins or ends.
+    none are given), around what clouds of their stamps show, and where a grip begins or ends. The
+    encoders are read at ``read`` (where the tissue is solved, where none are given).
     Effects of history are integrated between solved instants. A model that was lost three times in
     a row is not asked again until a grip begins or ends.
 
@@ -100,29 +112,34 @@ def predict(scene: Scene, motion: RecordedMotion, rows: Integers | None = None) 
     layers = Layers.of(scene.model.extension)
     wanted = _wanted(motion, rows, layers.delay_s)
     solved = np.flatnonzero(wanted)
+    read = solved if read is None else np.unique(read)
+    last = max(int(rows.max(initial=-1)) for rows in (solved, read))
+    asked = np.isin(np.arange(last + 1), read)
     twin = Twin(scene, start_s=float(motion.time_s[0]))
     states: list[TissueState] = []
     measured: dict[str, list[Pose]] = {name: [] for name in motion.arms}
     lost = 0
-    for row in range(int(solved[-1]) + 1 if len(solved) else 0):
+    for row in range(last + 1):
         time_s, tips = float(motion.time_s[row]), motion.tips(row)
         if not wanted[row]:
             twin.follow(tips, time_s)
-            continue
-        if _regripped(twin, motion, row):
-            lost = 0
-        if lost < MOST_LOST:
-            states.append(twin.track(tips, time_s))
-            lost = 0 if states[-1].converged else lost + 1
         else:
-            twin.follow(tips, time_s)
-            states.append(states[-1])
-        for name, poses in measured.items():
-            poses.append(twin.measured(name))
+            if _regripped(twin, motion, row):
+                lost = 0
+            if lost < MOST_LOST:
+                states.append(twin.track(tips, time_s))
+                lost = 0 if states[-1].converged else lost + 1
+            else:
+                twin.follow(tips, time_s)
+                states.append(states[-1])
+        if asked[row]:
+            for name, poses in measured.items():
+                poses.append(twin.measured(name))
     return Prediction(
         rows=solved,
         time_s=motion.time_s[solved],
         states=tuple(states),
+        read=read,
         measured={name: tuple(poses) for name, poses in measured.items()},
         camera=CameraLayer(scene.depth_camera, layers.camera),
         delay_s=layers.delay_s,

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from defras_bt.diagnosis.twins.tissue_frames import TissueFrames
+from defras_bt.diagnosis.twins.tissue_keyframes import Keyframes
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
@@ -39,15 +40,34 @@ class MeshCorrection:
     forces_n: dict[str, Floats]
 
     @staticmethod
-    def between(coarse: TissueFrames, fine: TissueFrames) -> MeshCorrection:
-        surfaces = tuple(
-            None if one is None or other is None else other.vertices_m - one.vertices_m
+    def none(coarse: TissueFrames) -> MeshCorrection:
+        """For a mesh of which there is no finer one."""
+        forces = {arm: np.zeros_like(force) for arm, force in coarse.forces_n.items()}
+        return MeshCorrection((None,) * len(coarse.surfaces), forces)
+
+    @staticmethod
+    def between(coarse: TissueFrames, fine: TissueFrames, at: Keyframes) -> MeshCorrection:
+        """From frames on both meshes, of which the fine one was led along the keyframes only: the
+        error changes slowly."""
+        known = [
+            (one.vertices_m, other.vertices_m)
             for one, other in zip(coarse.surfaces, fine.surfaces, strict=True)
-        )
+            if one is not None and other is not None
+        ]
+        if not known:
+            return MeshCorrection.none(coarse)
+        lost = np.full(known[0][0].shape, np.nan)
+        surfaces = [
+            lost if one is None or other is None else other.vertices_m - one.vertices_m
+            for one, other in ((coarse.surfaces[i], fine.surfaces[i]) for i in at.chosen)
+        ]
+        by_m = at.expanded(np.stack(surfaces, axis=2).reshape(-1, len(surfaces), 1))
+        shape = (*lost.shape, len(coarse.surfaces))
         forces = {
-            arm: np.nan_to_num(fine.forces_n[arm] - force) for arm, force in coarse.forces_n.items()
+            arm: at.expanded((fine.forces_n[arm] - force)[at.chosen].T[:, :, None])[:, :, 0].T
+            for arm, force in coarse.forces_n.items()
         }
-        return MeshCorrection(surfaces, forces)
+        return MeshCorrection(tuple(np.moveaxis(by_m.reshape(shape), 2, 0)), forces)
 
     def applied(self, frames: TissueFrames) -> TissueFrames:
         """``frames`` of any model on the coarse mesh, as far as possible put right."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from defras_bt.diagnosis.problem import Integers
 from defras_bt.diagnosis.twins.tissue_trajectory import Trajectory
 from defras_sim.effects import library
 from defras_sim.effects.camera_layer import CameraLayer
@@ -54,15 +55,19 @@ def before_the_camera(model: Extension) -> dict[str, Values]:
     return found
 
 
-def led_along(scene: Scene, model: Extension, trajectory: Trajectory) -> Prediction | None:
+def led_along(
+    scene: Scene, model: Extension, trajectory: Trajectory, solved: Integers | None = None
+) -> Prediction | None:
     """What tissue and arms do along ``trajectory`` as ``scene`` says, with all effects of ``model``
     and none of the scene's; None where no tissue can be like that, or a jaw would take none.
 
-    The tissue is solved at :attr:`Trajectory.solved`. Camera and clock are left out.
+    The tissue is solved at the instants ``solved``, where none are given at
+    :attr:`Trajectory.solved`. Camera and clock are left out.
     """
+    rows = trajectory.solved if solved is None else solved
     try:
         plain = scene.extended(before_the_camera(model))
-        return predict(plain, trajectory.motion, trajectory.solved)
+        return predict(plain, trajectory.motion, rows, trajectory.frames)
     except (NothingToGrasp, NoSuchTissue):
         return None
 
@@ -73,11 +78,12 @@ def frames_of(
     """The frames of ``trajectory`` as the camera of ``scene`` shows what was predicted, with the
     effects of ``model`` on camera and clock."""
     layers = Layers.of(model)
-    at = np.searchsorted(prediction.rows, trajectory.frames)
-    shown = [prediction.surface_shown(float(t) - layers.delay_s) for t in trajectory.time_s]
+    at = np.searchsorted(prediction.read, trajectory.frames)
+    times = trajectory.time_s
+    shown = [prediction.surface_shown(float(t) - layers.delay_s) for t in times]
     return TissueFrames(
         tuple(s if np.isfinite(s.vertices_m).all() else None for s in shown),
-        {arm: prediction.force_n(arm)[at] for arm in trajectory.motion.arms},
+        {arm: prediction.force_between_n(arm, times) for arm in trajectory.motion.arms},
         {arm: _positions(poses)[at] for arm, poses in prediction.measured.items()},
         CameraLayer(scene.depth_camera, layers.camera).corrected,
     )

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from joblib import Parallel, delayed
 
+from defras_bt.diagnosis.problem import Integers
 from defras_bt.diagnosis.recording_reader import UnusableRecording
 from defras_bt.diagnosis.twins.tissue_correction import MeshCorrection, finer
 from defras_bt.diagnosis.twins.tissue_first_jobs import first_jobs, key_shapes
@@ -16,6 +18,7 @@ from defras_bt.diagnosis.twins.tissue_frames import (
     frames_of,
     led_along,
 )
+from defras_bt.diagnosis.twins.tissue_keyframes import keyframes
 from defras_bt.diagnosis.twins.tissue_part import KeyShapes
 from defras_bt.diagnosis.twins.tissue_passes import led
 from defras_bt.diagnosis.twins.tissue_trajectory import Trajectory
@@ -49,12 +52,8 @@ class LedModels:
     ) -> None:
         self._scene, self._trajectories, self._jobs = scene, tuple(trajectories), jobs
         self._led: OrderedDict[str, tuple[Prediction, ...] | None] = OrderedDict()
-        plain, finest, self.shapes = self._begin(effects)
+        plain, self._corrections, self.shapes = self._begin(effects)
         self.uncorrected = tuple(plain)
-        self._corrections = tuple(
-            MeshCorrection.between(one, one if other is None else other)
-            for one, other in zip(plain, finest, strict=True)
-        )
         self.plain = tuple(
             correction.applied(each)
             for correction, each in zip(self._corrections, plain, strict=True)
@@ -120,8 +119,8 @@ class LedModels:
 
     def _begin(
         self, effects: Mapping[str, Effect]
-    ) -> tuple[list[TissueFrames], list[TissueFrames | None], list[KeyShapes]]:
-        """The plain model's frames, those on a finer mesh (None where there is none), and shapes.
+    ) -> tuple[list[TissueFrames], tuple[MeshCorrection, ...], list[KeyShapes]]:
+        """The plain model's frames, what a finer mesh would change of them, and shapes.
 
         All of it at once; the finer mesh takes longest, and begins first.
         """
@@ -135,7 +134,7 @@ class LedModels:
         found = Parallel(n_jobs=self._jobs, inner_max_num_threads=1)(
             [
                 *(
-                    delayed(led_along)(s, whole, each)
+                    delayed(led_along)(s, whole, each, None if s is scene else _sparse(each))
                     for s in scenes
                     for each in self._trajectories
                 ),
@@ -146,7 +145,7 @@ class LedModels:
         predicted = found[: count * len(scenes)]
         self._remember(self._key({}), predicted[-count:])
         plain: list[TissueFrames] = []
-        finest: list[TissueFrames | None] = []
+        corrections: list[MeshCorrection] = []
         for each, one, other in zip(
             self._trajectories, predicted[-count:], predicted[:count], strict=True
         ):
@@ -158,8 +157,24 @@ class LedModels:
             plain.append(frames_of(one, scene, whole, each))
             if all(surface is None for surface in plain[-1].surfaces):
                 raise UnusableRecording(f"{each.name}: the model finds no equilibrium in any frame")
-            finest.append(None if other is None else frames_of(other, scene, whole, each))
-        return plain, finest, key_shapes(found[count * len(scenes) :], count)
+            corrections.append(self._correction(one, None if fine is None else other, each))
+        return plain, tuple(corrections), key_shapes(found[count * len(scenes) :], count)
+
+    def _correction(
+        self, coarse: Prediction, fine: Prediction | None, trajectory: Trajectory
+    ) -> MeshCorrection:
+        """Of the same instants on both meshes, whatever delay the camera has."""
+        model = before_the_camera(self.whole({}))
+        one = frames_of(coarse, self._scene, model, trajectory)
+        if fine is None:
+            return MeshCorrection.none(one)
+        other = frames_of(fine, self._scene, model, trajectory)
+        return MeshCorrection.between(one, other, keyframes(trajectory))
+
+
+def _sparse(trajectory: Trajectory) -> Integers:
+    """The instants of the keyframes, at which a finer mesh is solved."""
+    return np.asarray(trajectory.frames[keyframes(trajectory).chosen])
 
 
 def key_of(model: Extension) -> str:
