@@ -81,11 +81,14 @@ def test_a_tick_is_streamed_and_counted(transport: LiveTransport, tmp_path: Path
     for _ in range(8):
         loop.command(Tick({"psm1": ArmMotion(UP)}, 0.05, {"psm1": loop.clock_s() - 0.01}))
         sleep(0.05)
+    # A tree that learned for long ends in a hold, which says nothing of how old motion may be.
+    loop.command(Tick({}, 0.05, {"psm1": loop.clock_s() - 30.0}))
+    sleep(0.05)
     loop.close()
     report = loop.report()
     assert report.broke == ""
     assert report.period.count > 5
-    assert report.latency_s["psm1"][0] >= 0.01
+    assert 0.01 <= report.latency_s["psm1"][0] <= report.latency_s["psm1"][1] < 1.0
     assert {arm for _, arm, _ in transport.sent} == {"PSM1"}, "nobody else was told to move"
     StreamLog.model_validate(stream_values(report))
     with (tmp_path / "stream.csv").open() as stream:

@@ -29,6 +29,11 @@ class Tick:
     tick_s: float
     stamps_s: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def moves(self) -> bool:
+        """Whether a tip is to go anywhere."""
+        return any(motion.velocity.moves for motion in self.motions.values())
+
 
 @dataclass(frozen=True)
 class Snapshot:
@@ -43,9 +48,10 @@ class Snapshot:
 @dataclass(frozen=True)
 class StreamReport:
     """``period``: between set-points, while any were sent. ``latency_s``: by sensor, from its
-    stamp to the first set-point decided on it; median and 99th percentile. ``took_up_s``: from
-    sending to the echo. ``broke``: what ended the stream, in words. ``realtime``: whether the
-    system let the stream run before other programs."""
+    stamp to the first set-point of a motion decided on it, median and 99th percentile: a hold may
+    be decided on anything, however old. ``took_up_s``: from sending to the echo. ``broke``: what
+    ended the stream, in words. ``realtime``: whether the system let the stream run before other
+    programs."""
 
     period: PeriodReport
     latency_s: Mapping[str, tuple[float, float]]
@@ -166,7 +172,7 @@ class ServoLoop:
                 drive.period(now_s, elapsed_s, lost, others_stopped=bool(stopped - {name}))
                 for name, drive in self._drives.items()
             ]
-        if tick is not None and any(sent):
+        if tick is not None and tick.moves and any(sent):
             for sensor, stamp_s in tick.stamps_s.items():
                 self._latencies.setdefault(sensor, Durations()).add(now_s - stamp_s)
         return any(sent)
