@@ -8,7 +8,7 @@ from typing import Literal, Protocol, get_args
 
 import numpy as np
 
-from defras_bt.learning.estimate import Keyframe
+from defras_bt.learning.estimate import AttachmentEstimator, Keyframe
 from defras_sim.geometry import Pose
 from defras_sim.scene import Scene
 
@@ -40,6 +40,13 @@ class MismatchService(Protocol):
     """Anything that says what explains a mismatch best."""
 
     def explain(
-        self, belief: Scene, keyframes: Sequence[Keyframe], rng: np.random.Generator
+        self,
+        belief: Scene,
+        keyframes: Sequence[Keyframe],
+        rng: np.random.Generator,
+        estimator: AttachmentEstimator,
     ) -> MismatchFinding:
-        """``keyframes`` are those since the grasp, in order of time; there is one at least."""
+        """``keyframes`` are those since the grasp, in order of time; there is one at least.
+
+        ``estimator`` says how well attachments could explain it.
+        """

@@ -8,10 +8,18 @@ from py_trees.common import Status
 
 from defras_bt.diagnosis.mismatch.finding import MismatchCause
 from defras_bt.executive.blackboard import LearningAttempt
+from defras_bt.executive.context import Context
 from defras_bt.executive.node import Node, NodeParameters, Role
 from defras_bt.executive.reasons import Code, Remedy
 from defras_bt.executive.recovery import RecoveryLeaf
 from defras_bt.executive.registry import register_node
+from defras_bt.learning.chain.estimators import EstimatorName
+
+
+class DiagnoseParameters(NodeParameters):
+    """``estimator``: who infers the attachments that other causes are held against."""
+
+    estimator: EstimatorName = "chain"
 
 
 class CauseParameters(NodeParameters):
@@ -30,6 +38,16 @@ class DiagnoseMismatch(RecoveryLeaf):
 
     remedy: ClassVar[Remedy] = Remedy.LEARN
     answers: ClassVar[frozenset[Status]] = frozenset({Status.SUCCESS, Status.FAILURE})
+    Parameters = DiagnoseParameters
+    parameters: DiagnoseParameters
+
+    def __init__(self, name: str, context: Context, parameters: DiagnoseParameters) -> None:
+        """
+        Raises:
+            NoWeights: as of LearnAttachments.
+        """
+        super().__init__(name, context, parameters)
+        self._estimator = context.estimator(parameters.estimator)
 
     def recover(self) -> Status:
         board, context = self.context.board, self.context
@@ -39,7 +57,9 @@ class DiagnoseMismatch(RecoveryLeaf):
             warning_state=board.warning_state or 0,
             tips_m={name: arm.tissue_from_tip.position_m for name, arm in arms.items()},
         )
-        found = context.mismatch.explain(context.scene, context.keyframes.frames(), context.rng)
+        found = context.mismatch.explain(
+            context.scene, context.keyframes.frames(), context.rng, self._estimator
+        )
         board.mismatch = found
         if found.cause != "attachments":
             data = {

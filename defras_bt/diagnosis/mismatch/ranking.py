@@ -18,7 +18,6 @@ from defras_bt.diagnosis.mismatch.rivals import (
 from defras_bt.learning.estimate import AttachmentEstimator, Keyframe
 from defras_bt.learning.evidence import compare
 from defras_bt.learning.hold_out import Split, split
-from defras_bt.learning.inverse import InverseEstimator
 from defras_bt.learning.misfit import misfit
 from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_sim.geometry import Floats
@@ -64,12 +63,15 @@ class MismatchRanking:
     """
 
     rule: MismatchRule = field(default_factory=MismatchRule)
-    estimator: AttachmentEstimator = field(default_factory=InverseEstimator)
     most_fitted: int = 3
     least_travel_m: float = 0.003
 
     def explain(
-        self, belief: Scene, keyframes: Sequence[Keyframe], rng: np.random.Generator
+        self,
+        belief: Scene,
+        keyframes: Sequence[Keyframe],
+        rng: np.random.Generator,
+        estimator: AttachmentEstimator,
     ) -> MismatchFinding:
         """See :class:`defras_bt.diagnosis.mismatch.finding.MismatchService`."""
         if not keyframes:
@@ -110,7 +112,7 @@ class MismatchRanking:
         best = min((j for j in judged if j.credible), key=lambda j: j.after_m, default=None)
         if best is None:
             return _attachments("nothing else explains it", before_m, shares)
-        learned = self.estimator.estimate(belief, keyframes, rng)
+        learned = estimator.estimate(belief, keyframes, rng)
         limit_m = self.rule.attachments_better * best.after_m
         if learned.adopted and learned.held_out_after_m < limit_m:
             return _attachments(

@@ -86,10 +86,12 @@ def moved_patches(
             found = _fitted_shift(points_m, surfaces, linear, fitted[number:], camera)
             if found is None:
                 continue
+            shifted = _shifted(replay, begin, len(surfaces), arm, found)
             for onset in range(begin, first + 1):
-                rival = _patch(replay, keyframes, surfaces, arm, found, onset)
-                if rival is not None:
-                    yield rival
+                later = [shifted[frame] for frame in range(onset, len(surfaces))]
+                if all(surface is not None for surface in later):
+                    shapes = (*surfaces[:onset], *(s for s in later if s is not None))
+                    yield _patch(keyframes, shapes, arm, found, onset)
 
 
 def moved_arms(
@@ -99,24 +101,32 @@ def moved_arms(
     surfaces: Sequence[Surface],
 ) -> Iterator[Rival]:
     """The arms are registered to the tissue with an error: all of them have been off by the same
-    all along, and took the tissue beside where they should have."""
+    all along, and took the tissue beside where they should have.
+
+    An error in height changes nothing: a jaw that closes higher holds the same tissue, and carries
+    it as far.
+    """
     camera = belief.depth_camera
     fitted = [i for i, points in enumerate(points_m) if len(points)]
+    shown = [keyframes[i] for i in fitted]
     columns = []
-    for axis in np.eye(3):
-        shapes = _registered(belief, keyframes, _PROBE_M * axis)
+    for axis in np.eye(3)[:2]:
+        shapes = _registered(belief, shown, _PROBE_M * axis)
         if shapes is None:
             return
         columns.append(
             [
-                (s.vertices_m - b.vertices_m) / _PROBE_M
-                for s, b in zip(shapes, surfaces, strict=True)
+                (shape.vertices_m - surfaces[i].vertices_m) / _PROBE_M
+                for i, shape in zip(fitted, shapes, strict=True)
             ]
         )
-    linear = {i: np.stack([column[i] for column in columns], axis=2) for i in fitted}
-    shift_m = _fitted_shift(points_m, surfaces, linear, fitted, camera)
-    shapes = None if shift_m is None else _registered(belief, keyframes, shift_m)
-    if shift_m is None or shapes is None:
+    linear = {i: np.stack(both, axis=2) for i, *both in zip(fitted, *columns, strict=True)}
+    beside_m = _fitted_shift(points_m, surfaces, linear, fitted, camera)
+    if beside_m is None:
+        return
+    shift_m = np.array([*beside_m, 0.0])
+    shapes = _registered(belief, keyframes, shift_m)
+    if shapes is None:
         return
     size = f"by {1e3 * float(np.linalg.norm(shift_m)):.1f} mm"
     yield Rival("arm", shapes, (STILL,) * len(shapes), size)
@@ -161,11 +171,15 @@ def _fitted_shift(
     frames: Sequence[int],
     camera: Camera,
 ) -> Floats | None:
-    """Shift (3,) of the patch that brings ``frames`` closest to their points, by the slopes.
+    """Shift (k,) of the patch that brings ``frames`` closest to their points, by the slopes
+    (vertices, 3, k).
 
     Gauss-Newton with Huber's weights; None where the model does not follow, or sees nothing.
     """
-    shift_m = np.zeros(3)
+    known = [slopes for slopes in linear.values() if slopes is not None]
+    if not known:
+        return None
+    shift_m = np.zeros(known[0].shape[2])
     for _ in range(_ITERATIONS):
         rows, sides = [], []
         for frame in frames:
@@ -192,29 +206,45 @@ def _fitted_shift(
     return shift_m
 
 
+def _shifted(
+    replay: Replay, begin: int, end: int, arm: str, shift_m: Floats
+) -> dict[int, Surface | None]:
+    """Shapes of the frames from ``begin`` on with the patch of ``arm`` moved, as the model really
+    has them; None where it does not follow."""
+    found: dict[int, Surface | None] = {}
+    for frame in range(begin, end):
+        state = replay.displaced(frame, {arm: shift_m})
+        found[frame] = None if state is None else state.surface
+    return found
+
+
 def _patch(
-    replay: Replay,
     keyframes: Sequence[Keyframe],
-    surfaces: Sequence[Surface],
+    shapes: tuple[Surface, ...],
     arm: str,
     shift_m: Floats,
     onset: int,
-) -> Rival | None:
-    """The explanation with shapes as the model really has them; None where it does not follow."""
-    shapes = list(surfaces)
-    for frame in range(onset, len(surfaces)):
-        state = replay.displaced(frame, {arm: shift_m})
-        if state is None:
-            return None
-        shapes[frame] = state.surface
-    begun = keyframes[onset]
-    back_m = begun.grasp_tips[arm].position_m - begun.tips[arm].position_m
-    size_m, way_m = float(np.linalg.norm(shift_m)), float(np.linalg.norm(back_m))
-    along = float(shift_m @ back_m) / max(size_m * way_m, 1e-12)
-    slipped = along >= _ALONG and size_m <= way_m + _PROBE_M
+) -> Rival:
+    """The explanation that the patch of ``arm`` has been ``shift_m`` (3,) off since ``onset``."""
+    size_m = float(np.linalg.norm(shift_m))
+    slipped = False
+    for back_m in _ways_back_m(keyframes, arm, onset):
+        way_m = float(np.linalg.norm(back_m))
+        along = float(shift_m @ back_m) / max(size_m * way_m, 1e-12)
+        slipped |= along >= _ALONG and size_m <= way_m + _PROBE_M
     return Rival(
         "grasp" if slipped else "arm",
-        tuple(shapes),
-        (STILL,) * len(surfaces),
+        shapes,
+        (STILL,) * len(shapes),
         f"{f'of {arm.upper()} ' if slipped else ''}by {1e3 * size_m:.1f} mm",
     )
+
+
+def _ways_back_m(keyframes: Sequence[Keyframe], arm: str, onset: int) -> list[Floats]:
+    """Ways (3,) back to where the tissue was taken, from places at which the tip may have been when
+    it slipped: some time after the frame before ``onset``."""
+    here = keyframes[onset]
+    taken_m = here.grasp_tips[arm].position_m
+    now_m = here.tips[arm].position_m
+    before_m = taken_m if onset == 0 else keyframes[onset - 1].tips[arm].position_m
+    return [taken_m - (now_m + share * (before_m - now_m)) for share in (0.0, 0.25, 0.5, 0.75)]
