@@ -26,6 +26,8 @@ _SMALLEST_GAIN = 1e-3
 _NOTHING = 0.1
 """Whitened squares that a step has to promise to be worth a prediction: a third of a standard
 error."""
+_INVISIBLE = 1e-8
+"""Whitened squares per sample below which a step of a parameter changes nothing."""
 _FINEST = 0.2
 """Of a parameter's step: strides below it are left to derivatives."""
 
@@ -188,15 +190,24 @@ def walked(counted: CountedProblem, fit: Fit, key: str, noise: Noise) -> Fit:
 def _bounded_step(
     noise: Noise, residual: Floats, jacobian: Floats, damping: float, lower: Floats, upper: Floats
 ) -> Floats:
+    """The step (k,); parameters on which nothing depends stay where they are."""
     white = noise.whiten(np.column_stack((jacobian, np.nan_to_num(residual))))
-    scale = np.sqrt(damping * np.maximum((white[:, :-1] ** 2).sum(axis=0), 1e-12))
+    squares = (white[:, :-1] ** 2).sum(axis=0)
+    seen = squares > _INVISIBLE * len(white)
+    step = np.zeros(len(squares))
+    if not seen.any():
+        return step
+    white = white[:, np.append(seen, True)]
+    scale = np.sqrt(damping * squares[seen])
+    lower, upper = lower[seen], upper[seen]
     # The QR factor holds all that the long columns say.
     triangle = np.asarray(np.linalg.qr(white, mode="r"))
     matrix = np.vstack((triangle[:, :-1], np.diag(scale)))
     target = np.concatenate((triangle[:, -1], np.zeros(len(scale))))
     span = np.maximum(upper - lower, 1e-12)
     found = lsq_linear(matrix, target, (lower - 1e-9 * span, upper + 1e-9 * span))
-    return np.asarray(found.x)
+    step[seen] = found.x
+    return step
 
 
 def _loss(noise: Noise, residual: Floats) -> float:

@@ -41,7 +41,9 @@ def standard_errors(
     drawn = [
         inverse @ white.T @ noise.whiten(part) for part in surrogates(noise, residual, count, rng)
     ]
-    by_chance = np.concatenate(drawn, axis=1).std(axis=1)
+    # What no number depends on may be anything.
+    unseen = np.sqrt(np.einsum("ij,ij->i", inverse, inverse)) / _PRIOR_STEPS
+    by_chance = np.hypot(np.concatenate(drawn, axis=1).std(axis=1), unseen)
     pulls = found.cross[:, :, 0] @ inverse
     folds = len(pulls)
     sandwich = np.sqrt((pulls**2).sum(axis=0) * folds / max(folds - 1, 1))

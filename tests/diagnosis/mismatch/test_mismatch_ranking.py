@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from defras_bt.diagnosis.mismatch.ranking import MismatchRanking
+from defras_bt.learning.chain.estimators import estimator
 from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
 from defras_sim.geometry import Pose
 from tests.diagnosis.mismatch.observed_pull import (
@@ -43,8 +44,8 @@ class Attachments:
 
 
 def explain(frames: list[Keyframe], attachments: Attachments | None = None):
-    ranking = MismatchRanking(estimator=attachments or Attachments())
-    return ranking.explain(held_scene(), frames, np.random.default_rng(5))
+    rng, asked = np.random.default_rng(5), attachments or Attachments()
+    return MismatchRanking().explain(held_scene(), frames, rng, asked)
 
 
 @pytest.fixture(scope="module")
@@ -93,10 +94,11 @@ def test_a_camera_that_was_bumped_is_moved_back():
     assert np.linalg.norm(back_m - corner_m) < 0.0015
 
 
-def test_what_attachments_did_is_nobody_elses_fault():
-    """An arm that is off explains a part of it; the true estimator explains more."""
-    frames = observed(held_scene(PATCH))
-    found = MismatchRanking().explain(held_scene(), frames, np.random.default_rng(5))
+@pytest.mark.parametrize("name", ["inverse", "chain"])
+def test_what_attachments_did_is_nobody_elses_fault(name):
+    """An arm that is off explains a part of it; the true estimators explain more."""
+    frames, rng = observed(held_scene(PATCH)), np.random.default_rng(5)
+    found = MismatchRanking().explain(held_scene(), frames, rng, estimator(name))
     assert found.cause == "attachments"
 
 
