@@ -16,7 +16,9 @@ from defras_bt.cli import plan as plan_command
 from defras_bt.cli import run as run_command
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.main import main
+from defras_bt.planning.preparation import Preparation
 from defras_bt.recording.run_file import STREAM_FILE
+from defras_sim.scene import Scene, load_scene
 
 Defras = Callable[..., tuple[int, str, str]]
 
@@ -124,6 +126,32 @@ def test_nothing_is_given_up_for_a_robot_that_does_not_answer(
     assert code == 2
     assert "no ROS 1 master answers" in err
     assert all((out / name).read_text() == "old" for name in names)
+
+
+def test_a_plan_is_of_the_patient_and_not_of_a_robot_s_speed(
+    defras: Defras, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Planned by a command that knows no robot, it holds on one whose arms reach more slowly."""
+    motion = "motion: {reach_speed_m_s: 0.02}"
+    scene, slower = quick_scene(tmp_path, "quick"), quick_scene(tmp_path, "slower", motion)
+    operated: list[Scene] = []
+    planned: list[Scene] = []
+
+    def rehearsed(believed: Scene, *_: object, **__: object) -> Preparation:
+        planned.append(believed)
+        return Preparation(1.5, None)
+
+    def silent(_: object, believed: Scene, __: object) -> None:
+        operated.append(believed)
+        raise UserError("--world dvrk: no ROS 1 master answers")
+
+    monkeypatch.setattr(run_command, "checked_laboratory", lambda *_: "lab")
+    monkeypatch.setattr(run_command, "slowed", lambda *_: load_scene(Path(slower)))
+    monkeypatch.setattr(run_command, "rehearsed", rehearsed)
+    monkeypatch.setattr(run_command, "connected", silent)
+    assert defras("run", scene, "--world", "dvrk")[0] == 2
+    assert planned == [load_scene(Path(scene))]
+    assert operated == [load_scene(Path(slower))]
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"", b"[]", b'{"schema": "other"}'])
