@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from defras_bt.cli.errors import UserError
+from defras_bt.diagnosis.mismatch.nodes import DiagnoseParameters
 from defras_bt.executive.operation import WORLDS
 from defras_bt.executive.proof.prover import prove
 from defras_bt.executive.tree_spec import TreeSpec
@@ -30,7 +31,7 @@ def require_asked(own: OwnWeights, tree: TreeSpec) -> None:
     learns = {
         spec.options.estimator
         for _, spec in tree.root.walk()
-        if isinstance(spec.options, LearnParameters)
+        if isinstance(spec.options, LearnParameters | DiagnoseParameters)
     }
     asked = {network for name in learns if (network := NETWORK_OF[name]) is not None}
     there = [name for name, _ in own.cards]
@@ -38,7 +39,7 @@ def require_asked(own: OwnWeights, tree: TreeSpec) -> None:
         does = f"asks {' and '.join(sorted(asked))}" if asked else "asks no network"
         raise UserError(
             f"--weights {own.folder}: it holds weights of {' and '.join(there)}, but the tree "
-            f"{tree.name} {does}; see `estimator` of LearnAttachments"
+            f"{tree.name} {does}; see `estimator` of LearnAttachments and DiagnoseMismatch"
         )
 
 

@@ -42,6 +42,7 @@ def test_the_ranking_gets_the_present_belief_and_the_shapes(bench, node):
     ((belief, frames),) = bench.mismatch.asked
     assert belief is bench.twin.scene
     assert [frame.stamp_s for frame in frames] == [0.0]
+    assert bench.mismatch.estimator is bench.estimator
 
 
 def test_the_attempt_is_remembered_so_that_it_is_not_repeated_at_once(bench, node):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defras_bt.diagnosis.mismatch.finding import MismatchCause, MismatchFinding
-from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
+from defras_bt.learning.estimate import AttachmentEstimate, AttachmentEstimator, Keyframe
 from defras_bt.learning.probe.choice import Tug
 from defras_bt.monitoring.reading import MonitorReading
 from defras_bt.planning.plan import MANOEUVRES, Action, GridPoint, Plan, Situation
@@ -182,16 +182,22 @@ class BenchEstimator:
 
 
 class BenchMismatch:
-    """Blames ``cause``; ``asked`` notes every question."""
+    """Blames ``cause``; ``asked`` notes every question, ``estimator`` who came with the last."""
 
     def __init__(self) -> None:
         self.cause: MismatchCause = "attachments"
+        self.estimator: AttachmentEstimator | None = None
         self.asked: list[tuple[Scene, Sequence[Keyframe]]] = []
 
     def explain(
-        self, belief: Scene, keyframes: Sequence[Keyframe], rng: np.random.Generator
+        self,
+        belief: Scene,
+        keyframes: Sequence[Keyframe],
+        rng: np.random.Generator,
+        estimator: AttachmentEstimator,
     ) -> MismatchFinding:
         self.asked.append((belief, keyframes))
+        self.estimator = estimator
         moved = Pose(np.array([0.003, 0.0, 0.0])) if self.cause == "camera" else None
         return MismatchFinding(
             self.cause, f"the {self.cause} did it", 0.004, 0.001, true_from_reported=moved
