@@ -8,6 +8,7 @@ from math import dist, isfinite
 from typing import NamedTuple
 
 from defras_bt.sensing.dead_reckoning import STRAYED_M, DeadReckoning
+from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 from defras_sim.worlds.protocol import ArmObservation, Command, Observation
 
@@ -51,11 +52,14 @@ class ArmPlausibility:
         self._lost: dict[str, _Place] = {}
         self._tick_s = scene.tick_s
         self._reckoned: defaultdict[str, DeadReckoning] = defaultdict(DeadReckoning)
+        self._goals_m: dict[str, Floats] = {}
 
     def sent(self, time_s: float, command: Command) -> None:
         """``command`` was sent for the tick that begins at ``time_s``; call it once per tick."""
         for name, arm in command.arms.items():
             self._reckoned[name].sent(time_s, arm.linear_m_s, self._tick_s)
+            if name in self._goals_m:
+                self._goals_m[name] = self._goals_m[name] + arm.linear_m_s * self._tick_s
 
     def faults(self, observation: Observation, *, driven_by_hand: bool) -> Mapping[str, str]:
         """A sentence for each arm that must not be acted on; call it once per tick."""
@@ -68,6 +72,7 @@ class ArmPlausibility:
             if driven_by_hand:
                 self._lost.pop(name, None)
             self._last[name] = place
+            self._note_goal(name, arm)
             away_m = dist(place.tip_m, place.setpoint_m)
             stopped = driven_by_hand or name in observation.stopped
             if stopped or away_m > FOLLOWING_M:
@@ -94,6 +99,17 @@ class ArmPlausibility:
                     f"where the commands lead, at most {STRAYED_M * 1e3:g} mm are allowed"
                 )
         return found
+
+    def _note_goal(self, name: str, arm: ArmObservation) -> None:
+        """A stream that hears from a slow tree too late ends the motion, and gives up the rest of
+        its way: then its goal is not where all commands together led."""
+        led_m = self._goals_m.pop(name, None)
+        goal = arm.goal_tissue_from_tip
+        if goal is None or not all(map(isfinite, goal.position_m.tolist())):
+            return
+        goal_m = self._goals_m[name] = goal.position_m
+        if led_m is not None:
+            self._reckoned[name].gave_up(led_m - goal_m)
 
     def _jump_m(self, name: str, now: _Place) -> float:
         """How far an arm is from where it was lost; 0 while it is not lost."""

@@ -72,6 +72,11 @@ class DeadReckoning:
         """Believe the next reading as if it were the first."""
         self._start_m = None
 
+    def gave_up(self, way_m: Floats) -> None:
+        """This part (3,) of what was sent will not be gone: who drives the arm gave it up."""
+        if self._start_m is not None:
+            self._start_m = _sum(self._start_m, _vector(way_m), -1.0)
+
     def strayed_m(self, stamp_s: float, setpoint: Pose) -> float:
         """How far ``setpoint`` (tissue_from_tip), read at ``stamp_s``, is from where commands led.
 

@@ -23,12 +23,14 @@ def faults(
     x_m: float,
     setpoint_x_m: float | None = None,
     *,
+    goal_x_m: float | None = None,
     by_hand: bool = False,
 ) -> str:
-    """What is said of an arm at ``x_m``; "" if nothing."""
+    """What is said of an arm at ``x_m``; "" if nothing. ``goal_x_m``: where its stream leads."""
     at = Pose(np.array([x_m, 0.0, 0.0]))
     told = at if setpoint_x_m is None else Pose(np.array([setpoint_x_m, 0.0, 0.0]))
-    arm = ArmObservation(time_s, at, told, 0.0)
+    goal = None if goal_x_m is None else Pose(np.array([goal_x_m, 0.0, 0.0]))
+    arm = ArmObservation(time_s, at, told, 0.0, goal_tissue_from_tip=goal)
     return check.faults(Observation(time_s, {"psm1": arm}), driven_by_hand=by_hand).get("psm1", "")
 
 
@@ -101,6 +103,27 @@ def test_an_arm_that_stays_does_not_follow_however_slowly_it_was_told_to_go(
         assert told_m < 2 * STRAYED_M
     assert told_m > STRAYED_M
     assert "psm1 does not follow: its set-point is" in faults(check, time_s + 5.0, 0.0)
+
+
+@pytest.mark.parametrize(("gives_up", "told"), [(0.5, False), (0.0, True)])
+def test_what_a_stream_gave_up_between_late_ticks_is_not_missed(check, gives_up, told) -> None:
+    """Each tick came so late that motion had ended, with half a tick's way left; an arm that only
+    stays behind its stream is still found out."""
+    step_m = 0.05 * SPEED_M_S
+    gone_m, goal_m, said = 0.0, 0.0, []
+    for tick in range(20):
+        said.append(faults(check, 0.5 * tick, gone_m, goal_x_m=goal_m))
+        go(check, 0.5 * tick)
+        gone_m, goal_m = gone_m + 0.5 * step_m, goal_m + (1.0 - gives_up) * step_m
+    assert any(said) is told
+
+
+@pytest.mark.parametrize("goal_m", [float("nan"), float("inf")])
+def test_a_goal_that_is_no_number_excuses_nothing(check, goal_m) -> None:
+    for tick in range(10):
+        said = faults(check, 0.05 * tick, 0.0, goal_x_m=goal_m)
+        go(check, 0.05 * tick)
+    assert "does not follow" in said
 
 
 def test_it_is_believed_again_where_the_commands_led(check) -> None:
