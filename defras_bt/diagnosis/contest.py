@@ -9,14 +9,14 @@ import numpy as np
 from defras_bt.diagnosis.columns import Option
 from defras_bt.diagnosis.diagnosis import Round, Trial
 from defras_bt.diagnosis.excess import is_practical
-from defras_bt.diagnosis.fitted import Fit, bare, conflicts, model_without
+from defras_bt.diagnosis.fitted import Fit, added, bare, conflicts, model_without
 from defras_bt.diagnosis.fitting import Addition, differentiate, extend, refine, walked, without
 from defras_bt.diagnosis.held_out import Loss, Products, losses
 from defras_bt.diagnosis.noise import Noise, estimate_noise
 from defras_bt.diagnosis.noise_search import Beside
 from defras_bt.diagnosis.predicted_folds import HeldOut
 from defras_bt.diagnosis.problem import Integers
-from defras_bt.diagnosis.ranking import Board, bounds_of, score, start_of
+from defras_bt.diagnosis.ranking import Board, bounds_of, starts_of
 from defras_bt.diagnosis.search import Search
 from defras_sim.geometry import Floats
 
@@ -144,12 +144,10 @@ def accepted_of(
     """Fit rivals fully, each beside what is in the model; accept the best if it is good enough."""
     fits: dict[str, Fit] = {}
     for key in keys:
-        option = int(score(now, found).option[key][0])
-        chosen, amplitudes = start_of(now, found, key, option)
         fit = extend(
             search.counted,
             search.fit,
-            [Addition(search.sketch.candidate(key), chosen, amplitudes)],
+            [_start(search, now, found, key)],
             search.noise,
             iterations=search.settings.iterations,
         )
@@ -171,6 +169,28 @@ def accepted_of(
     search.history.append(search.fit)
     search.noise = after
     return True
+
+
+def _start(search: Search, now: Board, found: Products, key: str) -> Addition:
+    """How a cause should begin. Far from null a linearised model is not to be trusted: a soft
+    spring that pulls a little may look like a firm one that holds. So of beginnings of different
+    size the twin itself says which is best."""
+    candidate = search.sketch.candidate(key)
+    starts = [
+        Addition(candidate, option, amplitudes) for option, amplitudes in starts_of(now, found, key)
+    ]
+    if len(starts) == 1:
+        return starts[0]
+    models = [added(search.fit.model, candidate, one.values(1.0)) for one in starts]
+    search.counted.foresee(models)
+
+    def loss(number: int) -> float:
+        residual = search.counted.residual(models[number])
+        if not np.isfinite(residual).any():
+            return np.inf
+        return float((search.noise.whiten(np.nan_to_num(residual)[:, None]) ** 2).sum())
+
+    return starts[min(range(len(starts)), key=loss)]
 
 
 def _settled(search: Search, key: str, noise: Noise) -> Fit:

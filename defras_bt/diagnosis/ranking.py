@@ -127,6 +127,23 @@ def start_of(board: Board, found: Products, key: str, option: int) -> tuple[Opti
     return chosen, np.asarray(loss.amplitudes[len(without) :, 0])
 
 
+def starts_of(
+    board: Board, found: Products, key: str, most: int = 3
+) -> list[tuple[Option, Floats]]:
+    """Options of a candidate with their fitted amplitudes, the best held out first, at most
+    ``most``: of those that step equally far one only."""
+    without = board.null(key)
+    best: dict[tuple[tuple[str, float], ...], tuple[float, Option, Floats]] = {}
+    for option, index in board.of_option[key]:
+        loss = losses(found, np.concatenate((without, index)), bounds_of(option, index))
+        size = tuple(sorted(option.tangent.steps[0].items()))
+        held_out = float(loss.total[0])
+        if size not in best or held_out < best[size][0]:
+            best[size] = (held_out, option, np.asarray(loss.amplitudes[len(without) :, 0]))
+    ordered = sorted(best.values(), key=lambda one: one[0])
+    return [(option, amplitudes) for _, option, amplitudes in ordered[:most]]
+
+
 def remainder(
     board: Board, found: Products, residual: Floats, key: str, option: int | None
 ) -> Floats:
