@@ -107,7 +107,7 @@ def _cases(
     usual = {
         # seeds, nulls, lacking, pairs. A run takes about 0.4 s of computing (coupon), 3 s (arm) and
         # 60 s (tissue on the coarse mesh): the quick ones together half an hour, on two cores.
-        ("coupon", True): (10, 200, 4, 10),
+        ("coupon", True): (10, 200, 2, 6),
         ("arm", True): (2, 30, 1, 4),
         ("tissue", True): (1, 6, 0, 0),
         ("coupon", False): (20, 200, 10, 30),
