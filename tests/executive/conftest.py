@@ -81,9 +81,9 @@ class Think(Toy):
     role: ClassVar[Role] = "task"
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def toys() -> SimpleNamespace:
-    """The toy classes and the ``registry`` that holds them."""
+    """The toy classes and the ``registry`` that holds them; a test may register more."""
     registry = Registry()
     classes = {node.__name__: registry.register(node) for node in (Watch, Limit, Push, Mend, Think)}
     return SimpleNamespace(registry=registry, **classes)
