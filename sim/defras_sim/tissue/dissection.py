@@ -107,6 +107,7 @@ def _cut(
 def _touches(starts: Integers, neighbours: Integers, node: int, side: np.ndarray) -> bool:
     """Whether a neighbour of ``node`` lies on the other side."""
     other = 3 - side[node]
+    # Compiled code knows no any() of a generator.
     for k in range(starts[node], starts[node + 1]):  # noqa: SIM110
         if side[neighbours[k]] == other:
             return True
