@@ -13,7 +13,8 @@ from defras_bt.benchmark.dvrk_fault_judge import read_facts
 from defras_bt.benchmark.dvrk_patient import write_scene
 from defras_bt.benchmark.force_error import ForceError
 from defras_bt.benchmark.own_process import ProcessFailed, in_own_process
-from defras_bt.benchmark.retraction import Preparations, Row, plan_for
+from defras_bt.benchmark.preparations import Plans, Preparations
+from defras_bt.benchmark.retraction import Row
 from defras_bt.dvrk.laboratory import at_robot_speed, open_world
 from defras_bt.dvrk.settings import Ros1Transport, load_setup
 from defras_bt.dvrk.stand_in.belief import measured_belief
@@ -52,6 +53,7 @@ def dvrk_rows(
     done: frozenset[str] = frozenset(),
 ) -> Iterator[Row]:
     """Run every case with every tree, one after the other, except those in ``done``."""
+    plans = Plans(preparations)
     for case in cases:
         for tree in trees:
             row = Row(case.name, case.relation, tree, {})
@@ -64,8 +66,8 @@ def dvrk_rows(
             tree_file = resource(f"trees/{tree}.yaml")
             plan = None
             if needs_plan(read_tree(tree_file)):
-                plan = plan_for(believed, preparations, 0, seed).plan
-            threshold_n = believed.thresholds.force_n or 2 * preparations.force_median_n
+                plan = plans.plan(believed, 0, seed)
+            threshold_n = plans.threshold_n(believed)
             operation = Operation(
                 scene=at_robot_speed(believed, setup),
                 actual=None,

@@ -12,7 +12,7 @@ from scipy.spatial import Delaunay
 
 from defras_bt.benchmark.cases import configurations, shipped
 from defras_bt.benchmark.mismatches import KINDS, Mismatch, draw_mismatch
-from defras_bt.benchmark.retraction import Preparations
+from defras_bt.benchmark.preparations import Preparations
 from defras_bt.monitoring.local import LocalMetric
 from defras_bt.monitoring.median import MedianMetric
 from defras_bt.monitoring.rest import calibrate_rest

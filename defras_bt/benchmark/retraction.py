@@ -8,26 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from joblib import Parallel, delayed
 
-from defras_bt.benchmark.cases import Case, configurations, shipped
+from defras_bt.benchmark.cases import Case
 from defras_bt.benchmark.force_error import ForceError
 from defras_bt.benchmark.generated_scenes import GeneratedScenes
+from defras_bt.benchmark.preparations import Plans, Preparations, in_world
 from defras_bt.executive.executive import ExecutiveFailed
 from defras_bt.executive.operation import Operation, operate
 from defras_bt.executive.tree_file import read_tree
-from defras_bt.planning.engine import Engine
-from defras_bt.planning.journal import Journal
-from defras_bt.planning.preoperative import (
-    PreoperativeResult,
-    preoperative_plans,
-    result_of,
-)
 from defras_bt.planning.preparation import needs_plan
-from defras_bt.planning.rehearsals import Progress, rehearse_all
-from defras_bt.planning.robust import sampled_beliefs
-from defras_bt.planning.scene_hash import scene_hash
 from defras_sim.resources import resource
 from defras_sim.scene import Scene
 from defras_sim.scene_generator import NoScene
@@ -40,6 +30,7 @@ ROBUST = "robust"
 """trees/defras.yaml with a plan that was chosen over sampled sets of attachments."""
 
 SAMPLES = 8
+"""Sets of attachments around the belief for :data:`ROBUST`."""
 
 RUNS = (*TREES, ORACLE)
 ALL_RUNS = (*RUNS, ROBUST)
@@ -60,29 +51,6 @@ class Row:
     @property
     def key(self) -> str:
         return f"{self.case} {self.relation} {self.run}"
-
-
-@dataclass(frozen=True)
-class Preparations:
-    """Plans by scene content, and F_m over the 17 configurations."""
-
-    plans: Mapping[str, PreoperativeResult]
-    force_median_n: float
-
-
-def prepared(
-    world: str,
-    *,
-    jobs: int = -1,
-    journal: Journal | None = None,
-    progress: Progress | None = None,
-) -> Preparations:
-    """Rehearse all grasp points of the 17 configurations: epsilon, and a plan for each."""
-    scenes = [_in_world(shipped(name), world) for name in configurations()]
-    results = preoperative_plans(
-        scenes, engine=Engine(jobs=jobs), journal=journal, progress=progress
-    )
-    return Preparations({r.scene_hash: r for r in results}, results[0].force_median_n)
 
 
 def run_cases(
@@ -132,11 +100,11 @@ def _rows_of(
     seed: int,
     scenes: Path | None,
 ) -> list[Row]:
-    generated = GeneratedScenes(scenes)
+    generated, plans = GeneratedScenes(scenes), Plans(preparations)
     return [
         row
         for case, runs in together
-        for row in _rows_of_case(case, runs, world, preparations, seed, generated)
+        for row in _rows_of_case(case, runs, world, plans, seed, generated)
     ]
 
 
@@ -144,7 +112,7 @@ def _rows_of_case(
     case: Case,
     runs: Sequence[str],
     world: str,
-    preparations: Preparations,
+    plans: Plans,
     seed: int,
     generated: GeneratedScenes,
 ) -> list[Row]:
@@ -159,26 +127,20 @@ def _rows_of_case(
     rows = []
     for run in runs:
         known = actual if run == ORACLE else believed
-        values = _run(case, known, actual, run, world, preparations, own_seed)
+        values = _run(known, actual, run, world, plans, own_seed)
         rows.append(Row(case.name, case.relation, run, values))
     return rows
 
 
 def _run(
-    case: Case,
-    believed: Scene,
-    actual: Scene,
-    run: str,
-    world: str,
-    preparations: Preparations,
-    seed: int,
+    believed: Scene, actual: Scene, run: str, world: str, plans: Plans, seed: int
 ) -> dict[str, Any]:
     tree_file = resource(f"trees/{run if run in TREES else TREES[0]}.yaml")
-    threshold_n = believed.thresholds.force_n or 2 * preparations.force_median_n
+    threshold_n = plans.threshold_n(believed)
     plan = None
     if needs_plan(read_tree(tree_file)):
         samples = SAMPLES if run == ROBUST else 0
-        plan = plan_for(_in_world(believed, world), preparations, samples, seed).plan
+        plan = plans.plan(in_world(believed, world), samples, seed)
     operation = Operation(
         scene=believed,
         actual=actual,
@@ -196,22 +158,3 @@ def _run(
     except ExecutiveFailed as error:
         values = {**force.summary, "outcome": "error", "error": str(error)}
     return {**values, **force.values()}
-
-
-def plan_for(
-    scene: Scene, preparations: Preparations, samples: int, seed: int
-) -> PreoperativeResult:
-    """The plan made before the operation; rehearsed now, if nobody did yet."""
-    known = preparations.plans.get(scene_hash(scene))
-    if known is not None and not samples:
-        return known
-    around = sampled_beliefs(scene, samples, np.random.default_rng([seed, samples]))
-    if known is not None:
-        executions, elsewhere = known.executions, rehearse_all(around, engine=Engine(jobs=1))
-    else:
-        executions, *elsewhere = rehearse_all([scene, *around], engine=Engine(jobs=1))
-    return result_of(scene, executions, preparations.force_median_n, elsewhere)
-
-
-def _in_world(scene: Scene, world: str) -> Scene:
-    return scene.for_bullet() if world == "bullet" else scene

@@ -15,7 +15,7 @@ from rich.table import Table
 from defras_bt.benchmark.files import write_benchmark
 from defras_bt.benchmark.monitor import monitor_figure, monitor_tables
 from defras_bt.benchmark.monitor_runs import MonitorRun, monitor_runs, retractions
-from defras_bt.benchmark.retraction import prepared
+from defras_bt.benchmark.preparations import prepared
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
 from defras_bt.planning.journal import InvalidJournal, Journal

@@ -14,7 +14,8 @@ from rich.table import Table
 from defras_bt.benchmark.cases import Case, generated_cases, table1_cases, table2_cases
 from defras_bt.benchmark.dvrk_retraction import DvrkSetting, dvrk_rows
 from defras_bt.benchmark.files import write_benchmark
-from defras_bt.benchmark.retraction import ALL_RUNS, RUNS, TREES, Row, prepared, run_cases
+from defras_bt.benchmark.preparations import prepared
+from defras_bt.benchmark.retraction import ALL_RUNS, RUNS, TREES, Row, run_cases
 from defras_bt.benchmark.retraction_summary import by_case, spread, success
 from defras_bt.benchmark.row_store import OtherBenchmark, RowStore
 from defras_bt.cli.errors import UserError

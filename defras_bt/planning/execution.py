@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 from defras_bt.planning.plan import GridPoint
+from defras_sim.retraction import Rehearsal
 
 
 @dataclass(frozen=True)
@@ -20,3 +22,13 @@ class Execution:
     visibility: float
     force_max_n: float
     finished: bool
+
+    @classmethod
+    def of(cls, rehearsal: Rehearsal) -> Self:
+        return cls(
+            point=rehearsal.point,
+            manoeuvres=rehearsal.manoeuvres,
+            visibility=rehearsal.best_visibility,
+            force_max_n=rehearsal.force_max_n,
+            finished=rehearsal.finished,
+        )

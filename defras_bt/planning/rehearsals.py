@@ -72,11 +72,5 @@ def _rehearse_point(
     found: dict[tuple[str, ...], Execution] = {}
     for sequence in SEQUENCES:
         rehearsal = rehearser.run(point, sequence)
-        found[rehearsal.manoeuvres] = Execution(
-            point=point,
-            manoeuvres=rehearsal.manoeuvres,
-            visibility=rehearsal.best_visibility,
-            force_max_n=rehearsal.force_max_n,
-            finished=rehearsal.finished,
-        )
+        found[rehearsal.manoeuvres] = Execution.of(rehearsal)
     return number, point, tuple(found.values())

@@ -42,15 +42,13 @@ def best_rehearsals(
     A point is done as soon as one sequence exposes the region. Sequences are followed up to
     ``most_force_n``: of tissue that is held firmly, most need not be gone through.
     """
-    rehearser = Rehearser(
-        scene, step_m=SCREENING_STEP_M, stop_when_exposed=True, most_force_n=most_force_n
-    )
+    rehearser = Rehearser(scene, step_m=SCREENING_STEP_M, stop_when_exposed=True)
     for point in points:
-        best = rehearser.run(point, SEQUENCES[0])
+        best = rehearser.run(point, SEQUENCES[0], most_force_n=most_force_n)
         for sequence in SEQUENCES[1:]:
             if best.best_visibility >= scene.thresholds.roi_visibility:
                 break
-            result = rehearser.run(point, sequence)
+            result = rehearser.run(point, sequence, most_force_n=most_force_n)
             if result.best_visibility > best.best_visibility:
                 best = result
         yield best

@@ -111,11 +111,8 @@ class Rehearser:
         *,
         step_m: float = 0.003,
         stop_when_exposed: bool = False,
-        most_force_n: float = np.inf,
     ) -> None:
-        """A retraction ends with the step whose grasp force is above ``most_force_n``."""
         self._scene = scene
-        self._most_force_n = most_force_n
         self._step_m = step_m
         self._enough = scene.thresholds.roi_visibility if stop_when_exposed else np.inf
         self._layers = Layers.of(scene.model.extension)
@@ -125,8 +122,14 @@ class Rehearser:
         """Stages of the point rehearsed last, by manoeuvres done."""
         self._point: GraspPoint | None = None
 
-    def run(self, point: GraspPoint, manoeuvres: Sequence[str]) -> Rehearsal:
-        """One rehearsal; cheapest if those of one point follow one another."""
+    def run(
+        self, point: GraspPoint, manoeuvres: Sequence[str], *, most_force_n: float = np.inf
+    ) -> Rehearsal:
+        """One rehearsal; cheapest if those of one point follow one another.
+
+        It ends with the step whose grasp force is above ``most_force_n``, which for one point may
+        only fall from one rehearsal to the next: what was ended is not gone through again.
+        """
         if point != self._point:
             self._start(point)
         done: tuple[str, ...] = ()
@@ -134,11 +137,11 @@ class Rehearser:
         for manoeuvre in manoeuvres:
             if not result.finished or result.best_visibility >= self._enough:
                 break
-            if result.force_max_n > self._most_force_n:
+            if result.force_max_n > most_force_n:
                 break
             ahead = (*done, manoeuvre)
             if ahead not in self._known:
-                self._known[ahead] = self._carry_out(self._known[done], manoeuvre)
+                self._known[ahead] = self._carry_out(self._known[done], manoeuvre, most_force_n)
             done, result = ahead, self._known[ahead].result
         return result
 
@@ -161,7 +164,7 @@ class Rehearser:
         self._point = point
         self._known = {(): _Stage(self._tissue.snapshot(), motion, 0.0, {}, start)}
 
-    def _carry_out(self, stage: _Stage, manoeuvre: str) -> _Stage:
+    def _carry_out(self, stage: _Stage, manoeuvre: str, most_force_n: float) -> _Stage:
         """One manoeuvre more."""
         self._tissue.restore(stage.tissue)
         motion, time_s, before = stage.motion.copy(), stage.time_s, stage.result
@@ -182,7 +185,7 @@ class Rehearser:
             seen = roi_visibility(self._scene, RayCaster(state.surface))
             if seen > best:
                 best, best_at_m = seen, tip_m
-            if seen >= self._enough or force_n > self._most_force_n:
+            if seen >= self._enough or force_n > most_force_n:
                 break
         result = Rehearsal(
             arm=before.arm,

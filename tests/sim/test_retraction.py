@@ -77,7 +77,7 @@ def test_unknown_manoeuvres_are_told(scene: Scene) -> None:
 def test_a_retraction_ends_with_the_step_that_is_too_forceful(scene):
     free = Rehearser(scene, step_m=0.008).run((1, 4), ("pull", "move"))
     limit_n = 0.5 * free.forces_n[0]
-    stopped = Rehearser(scene, step_m=0.008, most_force_n=limit_n).run((1, 4), ("pull", "move"))
+    stopped = Rehearser(scene, step_m=0.008).run((1, 4), ("pull", "move"), most_force_n=limit_n)
     assert stopped.finished
     assert len(stopped.forces_n) == 1
     assert limit_n < stopped.force_max_n <= free.forces_n[0]
