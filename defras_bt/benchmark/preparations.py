@@ -13,10 +13,11 @@ from defras_bt.planning.gentlest import rehearse_gentlest
 from defras_bt.planning.journal import Journal
 from defras_bt.planning.plan import Plan
 from defras_bt.planning.preoperative import (
-    THRESHOLD_OVER_MEDIAN,
     PreoperativeResult,
     preoperative_plans,
+    qualified,
     result_of,
+    threshold_n,
 )
 from defras_bt.planning.rehearsals import Progress, rehearse_all
 from defras_bt.planning.robust import sampled_beliefs
@@ -61,17 +62,18 @@ class Plans:
 
     def threshold_n(self, scene: Scene) -> float:
         """Epsilon [N]: what the scene states, or twice F_m."""
-        return scene.thresholds.force_n or (
-            THRESHOLD_OVER_MEDIAN * self._preparations.force_median_n
-        )
+        return threshold_n(scene, self._preparations.force_median_n)
 
     def plan(self, scene: Scene, samples: int, seed: int) -> Plan:
         """``samples``: sets of attachments around the belief over which it is chosen, if any."""
         key, median_n = scene_hash(scene), self._preparations.force_median_n
         known = self._preparations.plans.get(key)
         if samples:
+            alone = Engine(jobs=1)
+            executions = known.executions if known else rehearse_all([scene], engine=alone)[0]
+            points = {e.point for e in qualified(scene, executions, median_n)}
             around = sampled_beliefs(scene, samples, np.random.default_rng([seed, samples]))
-            executions, *elsewhere = rehearse_all([scene, *around], engine=Engine(jobs=1))
+            elsewhere = rehearse_all(around, engine=alone, only=[points] * samples)
             return result_of(scene, executions, median_n, elsewhere).plan
         if known is not None:
             return known.plan

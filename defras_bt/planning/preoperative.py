@@ -18,7 +18,7 @@ from defras_bt.planning.execution import Execution
 from defras_bt.planning.journal import Journal
 from defras_bt.planning.plan import ArmSituation, Plan, Situation
 from defras_bt.planning.planner import Planner
-from defras_bt.planning.rehearsals import STEP_M, Progress, rehearse_all
+from defras_bt.planning.rehearsals import STEP_M, Progress, reachable_points, rehearse_all
 from defras_bt.planning.robust import Robustness, choose_robust, sampled_beliefs
 from defras_bt.planning.scene_hash import scene_hash
 from defras_sim.retraction import arm_for
@@ -94,16 +94,43 @@ def preoperative_plans(
     if samples and rng is None:
         raise ValueError("drawing sets of attachments needs a random generator")
     drawn = [sampled_beliefs(scene, samples, rng) if rng else [] for scene in scenes]
-    everything = [*scenes, *(scene for around in drawn for scene in around)]
-    rehearsed = rehearse_all(
-        everything, engine=engine, journal=journal, progress=progress, step_m=step_m
+    believed = rehearse_all(
+        scenes, engine=engine, journal=journal, progress=progress, step_m=step_m
     )
-    believed, others = rehearsed[: len(scenes)], iter(rehearsed[len(scenes) :])
     median_n = median_force_n([execution for of_scene in believed for execution in of_scene])
+    # A sampled set can only decide between retractions that work as believed.
+    candidates = [
+        {e.point for e in qualified(scene, executions, median_n)}
+        for scene, executions in zip(scenes, believed, strict=True)
+    ]
+    before = sum(len(reachable_points(scene)) for scene in scenes)
+    others = iter(
+        rehearse_all(
+            [scene for around in drawn for scene in around],
+            engine=engine,
+            journal=journal,
+            progress=progress and (lambda done, of: progress(before + done, before + of)),
+            step_m=step_m,
+            only=[some for around, some in zip(drawn, candidates, strict=True) for _ in around],
+        )
+        if samples
+        else ()
+    )
     return [
         result_of(scene, executions, median_n, [next(others) for _ in around])
         for scene, executions, around in zip(scenes, believed, drawn, strict=True)
     ]
+
+
+def qualified(scene: Scene, executions: Iterable[Execution], median_n: float) -> list[Execution]:
+    """Those that the scene's rules allow and that expose the region within the force threshold."""
+    limit_n, visibility = threshold_n(scene, median_n), scene.thresholds.roi_visibility
+    return [e for e in _within(executions, visibility, limit_n) if not forbidden(scene, e)]
+
+
+def threshold_n(scene: Scene, median_n: float) -> float:
+    """Epsilon [N]: what the scene states, or twice F_m."""
+    return scene.thresholds.force_n or THRESHOLD_OVER_MEDIAN * median_n
 
 
 def result_of(
@@ -125,7 +152,7 @@ def result_of(
             f"scene {scene.name!r}: {executions[0].visibility:.0%} of the region is visible before "
             "anything is moved; put the region deeper under the tissue"
         )
-    limit_n = scene.thresholds.force_n or THRESHOLD_OVER_MEDIAN * median_n
+    limit_n = threshold_n(scene, median_n)
     allowed = [execution for execution in executions if not forbidden(scene, execution)]
     robust = None
     if elsewhere:
@@ -178,9 +205,13 @@ def forbidden(scene: Scene, execution: Execution) -> bool:
 
 def choose(executions: Iterable[Execution], visibility: float, limit_n: float) -> Execution | None:
     """Of the three gentlest that expose within the force limit the shortest, else the gentler."""
-    qualified = [e for e in executions if e.visibility >= visibility and e.force_max_n <= limit_n]
-    gentlest = sorted(qualified, key=lambda e: (e.force_max_n, e.point))[:LOWEST_FORCES_KEPT]
+    working = _within(executions, visibility, limit_n)
+    gentlest = sorted(working, key=lambda e: (e.force_max_n, e.point))[:LOWEST_FORCES_KEPT]
     return min(gentlest, key=lambda e: (len(e.manoeuvres), e.force_max_n), default=None)
+
+
+def _within(executions: Iterable[Execution], visibility: float, limit_n: float) -> list[Execution]:
+    return [e for e in executions if e.visibility >= visibility and e.force_max_n <= limit_n]
 
 
 def median_force_n(executions: Sequence[Execution]) -> float:

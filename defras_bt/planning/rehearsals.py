@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from joblib import Parallel, delayed
 
@@ -26,8 +26,11 @@ def rehearse_all(
     journal: Journal | None = None,
     progress: Progress | None = None,
     step_m: float = STEP_M,
+    only: Sequence[Collection[GridPoint]] | None = None,
 ) -> list[tuple[Execution, ...]]:
     """For each scene every reachable grasp point with every sequence of manoeuvres.
+
+    ``only``: for each scene the points that matter, if not all do.
 
     The order is fixed, whatever runs side by side. A sequence that exposes the region before its
     last manoeuvre equals a shorter one and is listed once. Points in ``journal`` are not rehearsed
@@ -35,7 +38,10 @@ def rehearse_all(
     """
     engine = engine or Engine()
     keys = [search_key(scene, step_m) for scene in scenes]
-    wanted = [(i, p) for i, scene in enumerate(scenes) for p in reachable_points(scene)]
+    points = [reachable_points(scene) for scene in scenes]
+    if only is not None:
+        points = [tuple(p for p in of if p in some) for of, some in zip(points, only, strict=True)]
+    wanted = [(i, point) for i, of_scene in enumerate(points) for point in of_scene]
     found: dict[tuple[int, GridPoint], tuple[Execution, ...]] = {}
     for i, point in wanted:
         known = journal.known(keys[i], point) if journal is not None else None
@@ -55,8 +61,7 @@ def rehearse_all(
                 if progress is not None:
                     progress(len(found), len(wanted))
     return [
-        tuple(e for point in reachable_points(scene) for e in found[i, point])
-        for i, scene in enumerate(scenes)
+        tuple(e for point in of_scene for e in found[i, point]) for i, of_scene in enumerate(points)
     ]
 
 

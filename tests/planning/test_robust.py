@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from defras_bt.planning.execution import Execution
-from defras_bt.planning.preoperative import preoperative_plans, result_of
+from defras_bt.planning.journal import Journal
+from defras_bt.planning.preoperative import preoperative_plans, qualified, result_of
 from defras_bt.planning.robust import (
     Robustness,
     carried_out,
@@ -70,6 +71,25 @@ def test_the_plan_says_in_how_many_sets_it_works():
     assert result.chosen == STURDY
     assert result.robustness == Robustness(3, 3, pytest.approx(0.38 / 3))
     assert result.reason.endswith("in 3 of 3 sets of attachments around the belief")
+
+
+def test_only_what_works_as_believed_is_rehearsed_elsewhere(tmp_path):
+    small = make_scene(3, 2, 0.02, tissue={"elements_xyz": (4, 4, 1)})
+    ticks, journal = [], Journal(tmp_path / "journal")
+    result = preoperative_plans(
+        [small],
+        step_m=0.01,
+        samples=2,
+        rng=np.random.default_rng(0),
+        journal=journal,
+        progress=lambda *tick: ticks.append(tick),
+    )[0]
+    points = {e.point for e in qualified(small, result.executions, result.force_median_n)}
+    assert 0 < len(points) < 6
+    assert ticks[-1] == (6 + 2 * len(points),) * 2
+    assert ticks == sorted(ticks)
+    assert result.robustness is not None
+    assert result.robustness.sets == 3
 
 
 def test_samples_do_not_count_for_epsilon_and_need_a_generator():
