@@ -12,8 +12,9 @@ from defras_bt.learning.estimate import AttachmentEstimator, Keyframe
 from defras_sim.geometry import Pose
 from defras_sim.scene import Scene
 
-MismatchCause = Literal["attachments", "grasp", "camera", "arm"]
-"""``grasp``: the tissue slipped in the jaw. ``arm``: a tip is not where it is told to be."""
+MismatchCause = Literal["attachments", "grasp", "camera", "arm", "unclear"]
+"""``grasp``: the tissue slipped in the jaw. ``arm``: a tip is not where it is told to be.
+``unclear``: what was seen so far fits several."""
 
 CAUSES: tuple[MismatchCause, ...] = get_args(MismatchCause)
 

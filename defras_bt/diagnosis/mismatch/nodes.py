@@ -68,9 +68,9 @@ class DiagnoseMismatch(RecoveryLeaf):
                 "before_m": found.before_m,
                 "after_m": found.after_m,
             }
-            board.tell(
-                "diagnosis", f"What does not fit was found: {found.sentence}.", "warning", data
-            )
+            known = "cannot be told yet" if found.cause == "unclear" else "was found"
+            told = f"What does not fit {known}: {found.sentence}."
+            board.tell("diagnosis", told, "warning", data)
         return self.succeed(Code.DIAGNOSED, f"{found.cause}: {found.sentence}")
 
 

@@ -59,7 +59,8 @@ class MismatchRanking:
 
     Attachments have many parameters and can be bent to explain a little of everything; a slip, a
     moved camera or an arm that is off have few. So attachments are blamed where none of these
-    explains enough, or where they explain more.
+    explains enough, or where they explain more. A camera is not moved while attachments explain as
+    much, however they came to: seen through a camera that is wrongly moved, nothing fits any more.
     """
 
     rule: MismatchRule = field(default_factory=MismatchRule)
@@ -117,6 +118,16 @@ class MismatchRanking:
         if learned.adopted and learned.held_out_after_m < limit_m:
             return _attachments(
                 "attachments explain it better than anything else", before_m, shares
+            )
+        if best.rival.cause == "camera" and learned.held_out_after_m < best.after_m:
+            return MismatchFinding(
+                "unclear",
+                f"a camera that was moved {best.rival.size} would bring points that were not "
+                f"fitted from {1e3 * before_m:.2f} to {1e3 * best.after_m:.2f} mm, and other "
+                f"attachments to {1e3 * learned.held_out_after_m:.2f} mm: more has to be seen",
+                before_m,
+                best.after_m,
+                shares,
             )
         cause: MismatchCause = best.rival.cause
         told = _TOLD[cause].format(size=best.rival.size)

@@ -94,6 +94,17 @@ def test_a_camera_that_was_bumped_is_moved_back():
     assert np.linalg.norm(back_m - corner_m) < 0.0015
 
 
+def test_a_camera_is_not_moved_while_attachments_explain_as_much():
+    bump = Pose(np.array([0.003, -0.002, 0.004]))
+    bumped = observed(held_scene(), camera_moved=[STILL] * 2 + [bump] * 3)
+    clear = explain(bumped)
+    assert clear.cause == "camera"
+    found = explain(bumped, Attachments(after_m=0.95 * clear.after_m))
+    assert found.cause == "unclear"
+    assert found.true_from_reported is None
+    assert "more has to be seen" in found.sentence
+
+
 @pytest.mark.parametrize("name", ["inverse", "chain"])
 def test_what_attachments_did_is_nobody_elses_fault(name):
     """An arm that is off explains a part of it; the true estimators explain more."""
