@@ -8,17 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from defras_bt.benchmark.cases import configurations, shipped
+from defras_bt.planning.choice import qualified, threshold_n
 from defras_bt.planning.engine import Engine
 from defras_bt.planning.gentlest import rehearse_gentlest
 from defras_bt.planning.journal import Journal
 from defras_bt.planning.plan import Plan
-from defras_bt.planning.preoperative import (
-    PreoperativeResult,
-    preoperative_plans,
-    qualified,
-    result_of,
-    threshold_n,
-)
+from defras_bt.planning.preoperative import PreoperativeResult, preoperative_plans, result_of
 from defras_bt.planning.rehearsals import Progress, rehearse_all
 from defras_bt.planning.robust import sampled_beliefs
 from defras_bt.planning.scene_hash import scene_hash

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from defras_bt.planning.choice import forbidden
 from defras_bt.planning.english import plan_text, point_text
 from defras_bt.planning.facts import attachment_distances_mm, roi_distances_mm
 from defras_bt.planning.plan import ArmSituation, GridPoint, Plan, Situation
 from defras_bt.planning.planner import NoPlan, Planner
-from defras_bt.planning.preoperative import PreoperativeResult, forbidden
+from defras_bt.planning.preoperative import PreoperativeResult
 from defras_sim.advice import Matter
 from defras_sim.scene import Scene
 

@@ -7,8 +7,8 @@ is followed no further. The choice is the same as after all rehearsals (tested).
 
 from __future__ import annotations
 
+from defras_bt.planning.choice import LOWEST_FORCES_KEPT, forbidden
 from defras_bt.planning.execution import Execution
-from defras_bt.planning.preoperative import LOWEST_FORCES_KEPT, forbidden
 from defras_bt.planning.rehearsals import STEP_M, reachable_points
 from defras_sim.exposure import promising_points
 from defras_sim.retraction import SEQUENCES, Rehearser

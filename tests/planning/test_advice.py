@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from defras_bt.planning.choice import forbidden
 from defras_bt.planning.execution import Execution
 from defras_bt.planning.plan import ArmSituation, Situation
 from defras_bt.planning.planner import NoPlan, Planner
-from defras_bt.planning.preoperative import forbidden, result_of
+from defras_bt.planning.preoperative import result_of
 from defras_sim.advice import Advice
 from tests.planning.conftest import make_scene
 from tests.planning.oracle import Oracle

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from defras_bt.planning.choice import choose
 from defras_bt.planning.engine import Engine
 from defras_bt.planning.gentlest import rehearse_gentlest
-from defras_bt.planning.preoperative import choose, preoperative_plan, result_of
+from defras_bt.planning.preoperative import preoperative_plan, result_of
 from defras_sim.retraction import arm_for
 from tests.planning.conftest import make_scene, same_outcomes
 

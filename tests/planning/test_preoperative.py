@@ -1,4 +1,4 @@
-"""Selection rule, force threshold, and the plan made before the operation."""
+"""The plan made before the operation, and its file."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from defras_bt.planning.choice import choose
 from defras_bt.planning.engine import Engine
 from defras_bt.planning.plan_file import (
     InvalidPlanFile,
@@ -16,53 +17,12 @@ from defras_bt.planning.plan_file import (
     load_plan,
     save_plan,
 )
-from defras_bt.planning.preoperative import (
-    Execution,
-    NothingToRetract,
-    choose,
-    median_force_n,
-    preoperative_plan,
-    preoperative_plans,
-)
+from defras_bt.planning.preoperative import NothingToRetract, preoperative_plan, preoperative_plans
 from defras_bt.planning.scene_hash import scene_hash
 from tests.planning.conftest import make_scene, same_outcomes
 
 STEP_M = 0.01
 ALONE = Engine(jobs=1)
-
-
-def execution(point, manoeuvres, visibility, force_max_n):
-    return Execution(point, tuple(manoeuvres.split()), visibility, force_max_n, True)
-
-
-SHORT = execution((1, 1), "pull", 0.9, 0.25)
-GENTLE = execution((2, 1), "pull move fold", 1.0, 0.10)
-MEDIUM = execution((3, 1), "pull fold", 0.8, 0.20)
-FOURTH = execution((4, 1), "pull", 1.0, 0.26)
-BLIND = execution((5, 1), "pull", 0.79, 0.01)
-ROUGH = execution((1, 2), "pull", 1.0, 0.31)
-
-
-@pytest.mark.parametrize(
-    ("executions", "best"),
-    [
-        ([GENTLE, MEDIUM, SHORT, FOURTH, BLIND, ROUGH], SHORT),  # shortest of the three gentlest
-        ([GENTLE, MEDIUM, FOURTH], FOURTH),
-        ([GENTLE, MEDIUM, BLIND], MEDIUM),
-        ([SHORT, FOURTH], SHORT),  # as short, gentler
-        ([BLIND, ROUGH], None),
-        ([], None),
-    ],
-)
-def test_choice(executions, best):
-    assert choose(executions, visibility=0.8, limit_n=0.3) == best
-    assert choose(executions[::-1], visibility=0.8, limit_n=0.3) == best
-
-
-def test_median_of_the_largest_forces():
-    assert median_force_n([SHORT, GENTLE, ROUGH]) == 0.25
-    with pytest.raises(ValueError, match="no retraction was rehearsed"):
-        median_force_n([])
 
 
 def test_a_region_that_is_visible_already_is_said_so():

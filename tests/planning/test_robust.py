@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from defras_bt.planning.choice import qualified
 from defras_bt.planning.execution import Execution
 from defras_bt.planning.journal import Journal
-from defras_bt.planning.preoperative import preoperative_plans, qualified, result_of
+from defras_bt.planning.preoperative import preoperative_plans, result_of
 from defras_bt.planning.robust import (
     Robustness,
     carried_out,
