@@ -31,26 +31,29 @@ KINDS = (
 )
 
 _ARMS = ("psm1", "psm2")
-_FEWEST, _MOST = 5, 280
-"""Set-points that moved an arm before the fault comes: a run has some 400 to 700."""
+_FEWEST, _MOST, _MOST_HELD = 5, 280, 120
+"""Set-points that moved an arm before the fault comes, of all and of those with tissue held: a run
+has some 400 to 700."""
 
 
 @dataclass(frozen=True)
 class DvrkFault:
     """``entry``: what is ordered from the stand-in, None where something is killed instead.
 
-    It comes when ``after`` set-points have moved an arm: in motion.
+    It comes when ``after`` set-points have moved an arm: in motion. ``held``: of those that moved
+    one since tissue is held, so that a grip can be lost.
     """
 
     kind: str
     seed: int
     after: int
+    held: bool = False
     entry: Mapping[str, Any] | None = None
     killed: Killed | None = None
 
 
 def drawn(kind: str, seed: int) -> DvrkFault:
-    """One fault of ``kind``; equal seeds give equal faults.
+    """One fault of ``kind``; equal seeds give equal ones. With odd seeds tissue is held before.
 
     Raises:
         KeyError: there is no such kind.
@@ -58,11 +61,12 @@ def drawn(kind: str, seed: int) -> DvrkFault:
     if kind not in KINDS:
         raise KeyError(kind)
     rng = np.random.default_rng([seed, *kind.encode()])
-    after = int(rng.integers(_FEWEST, _MOST))
+    held = seed % 2 == 1
+    after = int(rng.integers(_FEWEST, _MOST_HELD if held else _MOST))
     if kind == "master_killed":
-        return DvrkFault(kind, seed, after, killed="master")
+        return DvrkFault(kind, seed, after, held, killed="master")
     if kind == "stand_in_killed":
-        return DvrkFault(kind, seed, after, killed="stand_in")
+        return DvrkFault(kind, seed, after, held, killed="stand_in")
     entry: dict[str, Any] = {"fault": kind}
     if kind in ("paused", "fault", "unhomed"):
         entry["arm"] = str(rng.choice(_ARMS))
@@ -76,7 +80,7 @@ def drawn(kind: str, seed: int) -> DvrkFault:
         entry |= {"what": str(rng.choice(_ARMS)), "probability": float(rng.choice((0.5, 1.0)))}
     elif kind == "duplicated":
         entry["what"] = str(rng.choice((*_ARMS, "cloud")))
-    return DvrkFault(kind, seed, after, entry)
+    return DvrkFault(kind, seed, after, held, entry)
 
 
 def known_after_s(fault: DvrkFault, limits: Limits, oldest_s: float) -> float | None:

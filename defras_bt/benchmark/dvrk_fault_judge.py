@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from defras_bt.benchmark.dvrk_fault_cases import DvrkFault
+
 MOVED_M = 1e-6
 """A set-point that is nearer than this to the one before moves nothing."""
 
@@ -69,6 +71,20 @@ def moving(facts: Sequence[Fact]) -> list[float]:
         and "refused" not in fact
         and fact["way_m"] > MOVED_M
     ]
+
+
+class Countdown:
+    """Says when a fault is due, fact by fact of the stand-in's record."""
+
+    def __init__(self, fault: DvrkFault) -> None:
+        self._left, self._counts = fault.after, not fault.held
+
+    def over(self, fact: Fact) -> bool:
+        """Whether it is, now that ``fact`` was told too."""
+        self._counts |= fact["event"] == "arm" and bool(fact["grasped"])
+        if self._counts:
+            self._left -= len(moving([fact]))
+        return self._left <= 0
 
 
 def fault_times(facts: Sequence[Fact]) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from time import monotonic, sleep, time
 
 from defras_bt.benchmark.dvrk_fault_cases import DvrkFault, known_after_s
 from defras_bt.benchmark.dvrk_fault_judge import (
+    Countdown,
     DvrkVerdict,
     Fact,
     fault_times,
@@ -128,7 +129,7 @@ def _operation(scene: Scene, prepared: Preparation, seed: int) -> Operation:
 
 
 class _Trouble:
-    """Makes the fault when so many set-points have moved an arm."""
+    """Makes the fault when so many set-points have moved an arm, from a grasp on if it asks so."""
 
     def __init__(
         self, fault: DvrkFault, folder: Path, master: RosMaster, stand_in: StandInProcess
@@ -155,7 +156,7 @@ class _Trouble:
         self._thread.join()
 
     def _make(self) -> None:
-        moved, line = 0, ""
+        countdown, line = Countdown(self._fault), ""
         with self._witness.open(encoding="utf-8") as told:
             while not self._over.is_set():
                 # A line may be met while it is being written.
@@ -163,9 +164,9 @@ class _Trouble:
                 if not line.endswith("\n"):
                     sleep(0.002)
                     continue
-                moved += len(moving([json.loads(line)]))
+                fact = json.loads(line)
                 line = ""
-                if moved >= self._fault.after:
+                if countdown.over(fact):
                     self._strike()
                     return
 

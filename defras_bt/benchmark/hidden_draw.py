@@ -97,8 +97,8 @@ _STRONG: Mapping[str, tuple[str, Callable[[_Around], Values]]] = {
     ),
     "depth_bias": ("scale", lambda a: {"scale": 1 + a.either(0.008, 0.015), "offset_m": 0.001}),
     "extra_attachment": (
-        "stiffness_n_per_m",
-        lambda a: {"stiffness_n_per_m": a.between(200, 1000), **a.near_the_grasp()},
+        "share",
+        lambda a: {"share": a.between(0.85, 0.98), **a.near_the_grasp()},
     ),
     "grasp_offset": (
         "x_m",

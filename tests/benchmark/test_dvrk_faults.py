@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from defras_bt.benchmark.dvrk_fault_cases import KINDS, drawn, known_after_s
+from defras_bt.benchmark.dvrk_fault_cases import KINDS, DvrkFault, drawn, known_after_s
 from defras_bt.benchmark.dvrk_fault_judge import (
+    Countdown,
     DvrkVerdict,
     fault_times,
     first_picture_s,
@@ -80,6 +81,19 @@ def test_every_kind_can_be_drawn_and_ordered():
     assert known_after_s(drawn("paused", 0), limits, 0.5) == 0.0
     with pytest.raises(KeyError):
         drawn("earthquake", 0)
+
+
+def goal(way_m: float) -> dict:
+    return {"event": "goal", "time_s": 1.0, "command": "servo_cp", "way_m": way_m}
+
+
+def test_half_of_the_faults_wait_for_a_grasp_before_they_count_motion():
+    assert [drawn("paused", seed).held for seed in range(4)] == [False, True, False, True]
+    taken = {"event": "arm", "time_s": 1.0, "arm": "psm1", "grasped": True}
+    story = [goal(1e-3), goal(1e-3), taken, goal(0.0), goal(1e-3), goal(1e-3)]
+    free, held = (Countdown(DvrkFault("paused", 0, 2, held=held)) for held in (False, True))
+    assert [free.over(fact) for fact in story].index(True) == 1
+    assert [held.over(fact) for fact in story].index(True) == 5
 
 
 def verdict(**changes) -> DvrkVerdict:

@@ -11,8 +11,15 @@ SLACK = {"joint_play": (1.0, 3.0)}
 """Effects without a derivative at their null point, and of how many steps of theirs to try."""
 ONSET = {"grasp_slip": "time_s", "attachment_tear": "time_s"}
 """Effects that begin during the motion, and the parameter that says when."""
-ONSETS = 4
-STRONG = {"extra_attachment": 300.0, "missing_attachment": 1.0, "inclusion": 4.0}
+ONSETS, FINE_ONSETS = 4, 16
+"""Times at which such an effect may begin: of derivatives, and of what is led along in full, which
+is as easily begun at many times as at few."""
+STRONG = {
+    "attachment_tear": 1.0,
+    "extra_attachment": 0.9,
+    "inclusion": 4.0,
+    "missing_attachment": 1.0,
+}
 """Effects of a place whose beginning says little of how they end: a soft spring under tissue that
 is lifted far pulls ever more, a firm one holds it. The strength at which they are tried in full, at
 the places that explain the residual best."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from defras_bt.diagnosis.problem import Candidate, Tangent
 from defras_bt.diagnosis.twins.tissue_beginnings import (
+    ONSET,
     PLACES_TRIED,
     PROMISING,
     STRONG,
@@ -64,8 +65,14 @@ def wanted_of(
         yield Wanted(candidate.key, at, {p.name: inwards(p, at[p.name])})
     elif candidate.effect.name in STRONG and not is_there(model, candidate):
         step = {p.name: STRONG[candidate.effect.name] - p.null}
+        onset = ONSET.get(candidate.effect.name)
+        places: list[Mapping[str, float]] = []
         for tangent in _best(known, parts, tolerance):
-            yield Wanted(candidate.key, dict(tangent.at), step)
+            # What begins at one time is what was there from the start, cut off before that time.
+            at = dict(tangent.at) if onset is None else {**tangent.at, onset: 0.0}
+            if at not in places and len(places) < PLACES_TRIED:
+                places.append(at)
+                yield Wanted(candidate.key, at, step)
 
 
 def repeats(
@@ -106,7 +113,7 @@ def _there(wanted: Wanted) -> dict[str, float]:
 def _best(
     tangents: Sequence[Tangent], parts: Sequence[TissuePart], tolerance: Floats
 ) -> list[Tangent]:
-    """Those along which the residual would fall most."""
+    """Those along which the residual would fall, the best first."""
     scale = np.concatenate([np.repeat(tolerance, part.shape[1]) for part in parts])
     residual = np.nan_to_num(np.concatenate([part.residual.ravel() for part in parts]) / scale)
 
@@ -117,4 +124,4 @@ def _best(
 
     worth = PROMISING * float(residual @ residual)
     promising = [tangent for tangent in tangents if gain(tangent) > worth]
-    return sorted(promising, key=gain, reverse=True)[:PLACES_TRIED]
+    return sorted(promising, key=gain, reverse=True)

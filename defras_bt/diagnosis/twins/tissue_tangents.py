@@ -14,6 +14,7 @@ import numpy as np
 
 from defras_bt.diagnosis.problem import Candidate, Tangent
 from defras_bt.diagnosis.twins.tissue_beginnings import (
+    FINE_ONSETS,
     LATE_STEPS,
     ONSET,
     ONSETS,
@@ -123,7 +124,7 @@ class TissueTangents:
             yield self._smooth(candidate, self._carry)
             return
         (p, *_) = [p for p in candidate.free if p.strength]
-        for start in self._onsets_s() if onset else (None,):
+        for start in self._onsets_s(ONSETS) if onset else (None,):
             begun = at if onset is None or start is None else {**at, onset: start}
             for times in SLACK.get(name, (1.0,)):
                 step = times * p.step
@@ -161,14 +162,8 @@ class TissueTangents:
             if onset is None or is_there(self._model, candidate):
                 yield Tangent(at, steps, columns)
                 continue
-            for start in self._onsets_s():
-                begun = np.concatenate(
-                    [
-                        np.broadcast_to(part.trajectory.time_s >= start, part.shape).ravel()
-                        for part in self._parts
-                    ]
-                )
-                yield Tangent({**at, onset: start}, steps, columns * begun[:, None])
+            for start in self._onsets_s(ONSETS):
+                yield Tangent({**at, onset: start}, steps, self._from(start) * columns)
 
     def _repeated(self, candidate: Candidate) -> Iterator[Tangent]:
         for repeat in self._repeats:
@@ -180,7 +175,21 @@ class TissueTangents:
                     self._parts, self._shapes, repeat.shapes, strict=True
                 )
             ]
-            yield Tangent(repeat.wanted.at, (repeat.wanted.step,), np.concatenate(blocks)[:, None])
+            at, step, column = repeat.wanted.at, repeat.wanted.step, np.concatenate(blocks)[:, None]
+            onset = ONSET.get(candidate.effect.name)
+            if onset is None or is_there(self._model, candidate):
+                yield Tangent(at, (step,), column)
+                continue
+            for start in self._onsets_s(FINE_ONSETS):
+                yield Tangent({**at, onset: start}, (step,), self._from(start) * column)
+
+    def _from(self, start_s: float) -> Floats:
+        """1 in rows (n, 1) from ``start_s`` on, 0 before."""
+        begun = [
+            np.broadcast_to(part.trajectory.time_s >= start_s, part.shape).ravel()
+            for part in self._parts
+        ]
+        return np.concatenate(begun)[:, None].astype(float)
 
     def _led_along(self, jobs: int) -> list[KeyShapes]:
         """The model led along every trajectory: with derivatives, and with grips aside."""
@@ -193,8 +202,8 @@ class TissueTangents:
         ]
         return key_shapes(run_passes(work, self._effects, jobs), len(self._parts))
 
-    def _onsets_s(self) -> list[float]:
-        """Times spread over all in which tissue is held."""
+    def _onsets_s(self, count: int) -> list[float]:
+        """``count`` times spread over all in which tissue is held."""
         held: list[Floats] = []
         for part in self._parts:
             motion = part.trajectory.motion
@@ -203,7 +212,7 @@ class TissueTangents:
         times = np.sort(np.concatenate(held))
         if len(times) == 0:
             return []
-        at = np.linspace(0, len(times) - 1, ONSETS + 2)[1:-1]
+        at = np.linspace(0, len(times) - 1, count + 2)[1:-1]
         return [float(times[int(i)]) for i in at]
 
     def derivatives(self, candidate: Candidate) -> dict[str, Floats]:

@@ -6,24 +6,25 @@ import numpy as np
 
 from defras_sim.effects.disc import PLACE, Disc
 from defras_sim.effects.effect import EffectParameter, Values
-from defras_sim.effects.holding import by_holes
+from defras_sim.effects.holding import by_holes, strengthened_by, strengthened_n_per_m
 from defras_sim.effects.tissue_effect import Direction, Evolution, TissueEffect
 from defras_sim.geometry import Floats
-from defras_sim.scene import RIGID_HOLE_N_PER_M, Scene
+from defras_sim.scene import Scene
 from defras_sim.tissue.model import TissueModel
 
-STRENGTH = "stiffness_n_per_m"
+STRENGTH = "share"
 
 
 class ExtraAttachment(TissueEffect):
-    """Holes of a disc hold the tissue at least so firmly, from where it rests."""
+    """Holes of a disc have a share of the hold that they lack to a rigid attachment
+    (:mod:`defras_sim.effects.holding`), from where the tissue rests."""
 
     name = "extra_attachment"
     sentence = "The tissue is held where the model is free."
     parameters = (
         EffectParameter(
-            STRENGTH, "N/m", null=0.0, lower=0.0, upper=RIGID_HOLE_N_PER_M, step=40.0,
-            meaning="stiffness of each hole of the disc; above 1000 it is as good as rigid",
+            STRENGTH, "1", null=0.0, lower=0.0, upper=1.0, step=0.5,
+            meaning="share of the hold that the holes of the disc gain; 1 is rigid",
         ),
         *PLACE,
     )  # fmt: skip
@@ -37,32 +38,30 @@ class ExtraAttachment(TissueEffect):
 
 
 class _Held(Evolution):
-    def __init__(self, disc: Disc, stiffness_n_per_m: float, scene: Scene) -> None:
-        self._disc, self._strength = disc, stiffness_n_per_m
-        self._xy_m, self._is_hole = scene.holes_xy_m, scene.is_hole
-        self._share = np.where(self._is_hole, disc.share(self._xy_m), 0.0)
-        self._acts = np.ones(len(self._xy_m), dtype=bool)
-        """Where holes hold no more firmly without the effect."""
+    def __init__(self, disc: Disc, share: float, scene: Scene) -> None:
+        self._disc, self._strength, self._xy_m = disc, share, scene.holes_xy_m
+        self._is_hole = scene.is_hole.astype(float)
+        self._share = self._is_hole * disc.share(self._xy_m)
+        self._bare_n_per_m = np.zeros(len(self._xy_m))
 
     def hold_n_per_m(self, stiffness_n_per_m: Floats) -> Floats:
-        extra = self._strength * self._share
-        self._acts = self._is_hole & (stiffness_n_per_m <= extra)
-        return np.maximum(stiffness_n_per_m, extra)
+        self._bare_n_per_m = stiffness_n_per_m
+        return strengthened_n_per_m(stiffness_n_per_m, self._strength * self._share)
 
     def directions(self) -> tuple[Direction, ...]:
-        acts = self._acts.astype(float)
+        slope = self._is_hole * strengthened_by(self._bare_n_per_m, self._strength * self._share)
         if self._strength == 0.0:
-            free_m = self._xy_m[self._acts]
+            free_m = self._xy_m[(self._is_hole > 0) & (self._bare_n_per_m == 0)]
             if not len(free_m):
                 return ()
             return tuple(
-                Direction(STRENGTH, disc.place, by_holes(acts * disc.share(self._xy_m)))
+                Direction(STRENGTH, disc.place, by_holes(slope * disc.share(self._xy_m)))
                 for disc in self._disc.elsewhere(free_m)
             )
         by = {STRENGTH: self._share}
-        for name, slope in self._disc.share_by(self._xy_m).items():
-            by[name] = self._strength * slope
-        return tuple(Direction(name, {}, by_holes(acts * each)) for name, each in by.items())
+        for name, each in self._disc.share_by(self._xy_m).items():
+            by[name] = self._strength * each
+        return tuple(Direction(name, {}, by_holes(slope * each)) for name, each in by.items())
 
 
 EFFECT = ExtraAttachment()

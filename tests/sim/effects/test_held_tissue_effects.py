@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from defras_sim.effects.extended_tissue import ExtendedTissue
-from defras_sim.effects.holding import TISSUE_N_PER_M, weakened_by, weakened_n_per_m
+from defras_sim.effects.holding import (
+    TISSUE_N_PER_M,
+    strengthened_by,
+    strengthened_n_per_m,
+    weakened_by,
+    weakened_n_per_m,
+)
 from defras_sim.geometry import Pose
 from defras_sim.scene import RIGID_HOLE_N_PER_M, Attachments, Scene
 from tests.sim.effects.extended_motion import (
@@ -36,7 +42,7 @@ def force_n(tissue: ExtendedTissue, *poses: Pose, step_s: float = 1.0) -> float:
 @pytest.mark.parametrize(
     ("name", "strength", "hole", "mark"),
     [
-        ("extra_attachment", {"stiffness_n_per_m": RIGID_HOLE_N_PER_M}, 21, "#"),
+        ("extra_attachment", {"share": 1.0}, 21, "#"),
         ("missing_attachment", {"share": 1.0}, 35, "."),
         ("attachment_tear", {"share": 1.0}, 35, "."),
     ],
@@ -78,6 +84,20 @@ def test_the_hold_that_tissue_feels_is_shared_out_evenly() -> None:
     step = 1e-6
     slope = (weakened_n_per_m(stiffness, lost + step) - left) / step
     np.testing.assert_allclose(weakened_by(stiffness, lost), slope, rtol=1e-4)
+
+
+def test_a_hold_gained_is_a_share_of_what_a_rigid_hole_has_more() -> None:
+    stiffness = np.array([0.0, 10.0, 40.0, RIGID_HOLE_N_PER_M])
+    rigid = RIGID_HOLE_N_PER_M / (RIGID_HOLE_N_PER_M + TISSUE_N_PER_M)
+    hold = stiffness / (stiffness + TISSUE_N_PER_M)
+    gained = np.full(4, 0.25)
+    more = strengthened_n_per_m(stiffness, gained)
+    np.testing.assert_allclose(more / (more + TISSUE_N_PER_M), 0.75 * hold + 0.25 * rigid)
+    np.testing.assert_array_equal(strengthened_n_per_m(stiffness, np.zeros(4)), stiffness)
+    np.testing.assert_allclose(strengthened_n_per_m(stiffness, np.ones(4)), RIGID_HOLE_N_PER_M)
+    step = 1e-6
+    slope = (strengthened_n_per_m(stiffness, gained + step) - more) / step
+    np.testing.assert_allclose(strengthened_by(stiffness, gained), slope, rtol=1e-4)
 
 
 PATCH = {"x_m": -0.035, "y_m": 0.015, "radius_m": 0.02, "share": 1.0}

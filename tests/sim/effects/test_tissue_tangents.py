@@ -30,7 +30,7 @@ PRESENT = {
     "attachment_compliance": {"compliance_m_per_n": 0.02},
     "attachment_tear": {"share": 0.6, "time_s": 1.5, **PATCH},
     "breathing": {"amplitude_m": 0.002, "period_s": 5.0, "phase_rad": 0.3},
-    "extra_attachment": {"stiffness_n_per_m": 30.0, **FREE},
+    "extra_attachment": {"share": 0.4, **FREE},
     "inclusion": {"scale": 3.0, **PATCH},
     "missing_attachment": {"share": 0.6, **PATCH},
     "stiffness": {"scale": 1.7},

@@ -112,7 +112,7 @@ def worst_mu_m(actual: Extension, adopted: Extension) -> float:
         {"camera_latency": {"delay_s": 0.3}},
         {"camera_registration": {"turn_z_rad": 0.05}, "depth_bias": {"scale": 0.9}},
         {"grasp_slip": {"distance_m": 0.01, "time_s": 2.5}, "tool_offset": {"turn_z_rad": 0.2}},
-        {"extra_attachment": {"x_m": -0.02, "y_m": 0.02, "stiffness_n_per_m": 1e4}},
+        {"extra_attachment": {"x_m": -0.02, "y_m": 0.02, "share": 1.0}},
     ],
     ids=" and ".join,
 )
