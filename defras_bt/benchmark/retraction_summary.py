@@ -38,10 +38,16 @@ def by_case(rows: Sequence[Row]) -> list[dict[str, Any]]:
                 **{name: row.values.get(key) for name, key in MEASURES.items()},
                 "updates adopted": updates["adopted"],
                 "updates tried": updates["tried"],
-                "error": row.values.get("error"),
+                "why not": None if row.values["outcome"] == "goal" else _why(row),
             }
         )
     return lines
+
+
+def _why(row: Row) -> str | None:
+    """In words why the goal was not reached, where the run says so."""
+    reason = row.values.get("reason") or {}
+    return row.values.get("error") or reason.get("sentence")
 
 
 def success(rows: Sequence[Row]) -> list[dict[str, Any]]:

@@ -114,3 +114,14 @@ def test_rows_survive_a_kill_and_are_not_mixed_with_others(tmp_path):
     with pytest.raises(OtherBenchmark, match="start without --resume"):
         RowStore(file, "table1, seed 1", resume=True)
     assert RowStore(file, "table1, seed 1", resume=False).rows == []
+
+
+def test_a_case_says_why_its_goal_was_not_reached():
+    reason = {"code": "blamed", "sentence": "the tip is not where it is told to be"}
+    told = {"outcome": "human", "reason": reason}
+    broke = {"outcome": "error", "error": "the world went away"}
+    reached = {"outcome": "goal", "reason": {"code": "goal", "sentence": "the goal is reached"}}
+    lines = by_case(
+        [Row("a", "more", run, v) for run, v in zip("xyz", (told, broke, reached), strict=True)]
+    )
+    assert [line["why not"] for line in lines] == [reason["sentence"], broke["error"], None]
