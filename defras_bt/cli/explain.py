@@ -45,6 +45,11 @@ def explain(
     console = Console(soft_wrap=True, highlight=False)
     if tick is not None and time is not None:
         raise UserError("--tick and --time: give one of them")
+    if not run.exists():
+        raise UserError(
+            f"{run} does not exist; give a folder that defras run --out left, or a plan file that "
+            "defras plan wrote"
+        )
     if run.is_file():
         if tick is not None or time is not None:
             raise UserError(f"--tick and --time: {run} is a plan; they belong to a run's folder")

@@ -20,8 +20,10 @@ def rehearse_gentlest(
 ) -> tuple[Execution, ...]:
     """Every reachable grasp point with every sequence, each as far as it can still be chosen.
 
-    In the order of :func:`~defras_bt.planning.rehearsals.rehearse_all`. Points that promise most
-    come first on the way: the sooner gentle ones are known, the less is followed of the others.
+    For :func:`~defras_bt.planning.choice.choose` only: what was cut short shows no more than was
+    seen by then. The order is that of :func:`~defras_bt.planning.rehearsals.rehearse_all`. Points
+    that promise most come first on the way: the sooner gentle ones are known, the less is followed
+    of the others.
     """
     rehearser = Rehearser(scene, step_m=step_m, stop_when_exposed=True)
     reachable = reachable_points(scene)

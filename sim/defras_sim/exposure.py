@@ -13,6 +13,9 @@ from defras_sim.scene import GraspPoint, Scene
 SCREENING_ELEMENTS_XYZ = (6, 6, 1)
 SCREENING_STEP_M = 0.005
 
+_FAR_M = 1.0
+"""As far as attachments are where there are none."""
+
 # To count as exposing, a retraction shows this much more than the goal, so that another mesh or a
 # slightly different motion still reaches it.
 VISIBILITY_MARGIN = 0.05
@@ -27,7 +30,7 @@ def promising_points(scene: Scene) -> list[GraspPoint]:
 
     def promise_m(point: GraspPoint) -> float:
         xy_m = scene.grasp_xy_m(*point)
-        from_held = np.linalg.norm(held_xy_m - xy_m, axis=1).min()
+        from_held = np.linalg.norm(held_xy_m - xy_m, axis=1).min(initial=_FAR_M)
         from_region = np.linalg.norm(scene.roi_center_m[:2] - xy_m)
         return float(np.round(from_held - from_region, 9))
 

@@ -72,3 +72,11 @@ def test_rules_that_cannot_be_kept(defras, tmp_path, arguments, message):
     assert code == 2
     assert message in " ".join(err.split())
     assert file.read_text() == DEMO.read_text()
+
+
+def test_what_is_not_there_may_have_been_either(defras, tmp_path):
+    code, _, err = defras("explain", str(tmp_path / "none.plan.json"))
+    assert code == 2
+    assert "does not exist; give a folder that defras run --out left, or a plan file" in " ".join(
+        err.split()
+    )

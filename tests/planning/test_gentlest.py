@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from defras_bt.planning.choice import choose
 from defras_bt.planning.engine import Engine
 from defras_bt.planning.gentlest import rehearse_gentlest
 from defras_bt.planning.preoperative import preoperative_plan, result_of
+from defras_bt.planning.rehearsals import reachable_points
 from defras_sim.retraction import arm_for
 from tests.planning.conftest import make_scene, same_outcomes
 
@@ -59,3 +61,9 @@ def test_what_a_rule_forbids_makes_no_room_for_others(small, everything):
     whole = result_of(ruled, everything.executions, threshold_n / 2)
     assert same_outcomes([e for e in [needed.chosen] if e], [e for e in [whole.chosen] if e])
     assert needed.chosen is None or needed.chosen.point != point
+
+
+def test_tissue_that_nothing_holds_is_rehearsed_too(small):
+    free = small.with_attached(np.zeros(len(small.attached), dtype=bool))
+    found = rehearse_gentlest(free, 0.1, step_m=0.03)
+    assert {e.point for e in found} == set(reachable_points(free))

@@ -213,7 +213,7 @@ class TissueTangents:
         if len(times) == 0:
             return []
         at = np.linspace(0, len(times) - 1, count + 2)[1:-1]
-        return [float(times[int(i)]) for i in at]
+        return sorted({float(times[int(i)]) for i in at})
 
     def derivatives(self, candidate: Candidate) -> dict[str, Floats]:
         """Change (n,) per unit of those free parameters of a candidate that the model has, of which
