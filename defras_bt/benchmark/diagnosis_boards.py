@@ -75,12 +75,18 @@ def confusion(rows: Sequence[BoardRow], twin: TwinName) -> list[dict[str, Any]]:
 
 
 def is_right(row: BoardRow) -> bool:
-    """Whether just what was hidden was named."""
-    return sorted(row.named) == sorted(row.causes)
+    """Whether just what was hidden was named; at whichever site, where none is part of what was
+    hidden."""
+    return sorted(said_of(row, row.named)) == sorted(row.causes)
 
 
 def _in_set(row: BoardRow) -> bool:
-    return all(cause in (*row.named, *row.alike) for cause in row.causes)
+    return set(row.causes) <= set(said_of(row, (*row.named, *row.alike)))
+
+
+def said_of(row: BoardRow, keys: Sequence[str]) -> list[str]:
+    """``keys`` as what was hidden is called: without their site, where it has none."""
+    return [key.split("@")[0] if key.split("@")[0] in row.causes else key for key in keys]
 
 
 def _beside(rows: Sequence[BoardRow]) -> list[dict[str, Any]]:

@@ -32,7 +32,6 @@ from defras_sim.worlds.error import WorldError
 
 _BELIEVED = "sim1"
 _POINT, _OTHER_POINT = (2, 4), (4, 4)
-_COARSE_XYZ = (4, 4, 1)
 
 
 @dataclass(frozen=True)
@@ -95,21 +94,21 @@ class _Material:
 
 
 def board_rows(
-    cases: Sequence[BoardCase], *, coarse: bool, baselines: bool, jobs: int
+    cases: Sequence[BoardCase], *, further: bool, baselines: bool, jobs: int
 ) -> Iterator[BoardRow]:
-    """A row for each case, as they end. ``coarse``: the model's tissue has 4x4x1 elements (reality
-    has as many as ever), and nothing is measured of other retractions."""
-    work = (delayed(board_row)(case, coarse=coarse, baselines=baselines) for case in cases)
+    """A row for each case, as they end. ``further``: what was gained is measured on other
+    retractions, too."""
+    work = (delayed(board_row)(case, further=further, baselines=baselines) for case in cases)
     yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(work)
 
 
-def board_row(case: BoardCase, *, coarse: bool, baselines: bool) -> BoardRow:
+def board_row(case: BoardCase, *, further: bool, baselines: bool) -> BoardRow:
     """Make the data of a case, and ask what is wrong with them.
 
     Where reality itself finds no equilibrium there is nothing to ask; the row says so.
     """
     try:
-        return _asked(case, coarse=coarse, baselines=baselines)
+        return _asked(case, further=further, baselines=baselines)
     except WorldError as error:
         nothing: dict[str, bool] = {}
         return BoardRow(
@@ -131,9 +130,9 @@ def board_row(case: BoardCase, *, coarse: bool, baselines: bool) -> BoardRow:
         )
 
 
-def _asked(case: BoardCase, *, coarse: bool, baselines: bool) -> BoardRow:
+def _asked(case: BoardCase, *, further: bool, baselines: bool) -> BoardRow:
     with TemporaryDirectory() as folder:
-        made = _made(case, Path(folder), coarse=coarse)
+        made = _made(case, Path(folder), further=further)
         problem: Problem = made.problem
         if case.board == "lacking" and case.twin != "tissue":
             problem = Without(problem, _effects(case))
@@ -170,10 +169,10 @@ def _asked(case: BoardCase, *, coarse: bool, baselines: bool) -> BoardRow:
     )
 
 
-def _made(case: BoardCase, folder: Path, *, coarse: bool) -> _Material:
+def _made(case: BoardCase, folder: Path, *, further: bool) -> _Material:
     rng = np.random.default_rng([case.seed, *case.key.encode()])
     if case.twin == "tissue":
-        return _retraction(case, folder, rng, coarse=coarse)
+        return _retraction(case, folder, rng, further=further)
     hidden = hidden_in_table(case, rng)
     file = folder / "measured.csv"
     (arm_table if case.twin == "arm" else coupon_table)(file, hidden, rng)
@@ -181,12 +180,9 @@ def _made(case: BoardCase, folder: Path, *, coarse: bool) -> _Material:
 
 
 def _retraction(
-    case: BoardCase, folder: Path, rng: np.random.Generator, *, coarse: bool
+    case: BoardCase, folder: Path, rng: np.random.Generator, *, further: bool
 ) -> _Material:
     scene = shipped(_BELIEVED)
-    if coarse:
-        tissue = scene.tissue.model_copy(update={"elements_xyz": _COARSE_XYZ})
-        scene = scene.model_copy(update={"tissue": tissue})
     drawn = [draw(scene, cause, case.seed) for cause in case.causes or (NULL,)]
     hidden: dict[str, dict[str, float]] = {}
     for one in drawn:
@@ -205,7 +201,7 @@ def _retraction(
         return TissueProblem(scene, [run], candidates, jobs=1, to_score=number > 0)
 
     main = problem(_POINT, 0)
-    if coarse or case.board != "one":
+    if not further or case.board != "one":
         return _Material(main, None, None, hidden)
     return _Material(main, problem(_POINT, 1), problem(_OTHER_POINT, 2), hidden)
 

@@ -248,7 +248,9 @@ class _TimedTwin(Twin):
     def release(self, arm: str, time_s: float | None = None) -> None:
         pass
 
-    def track(self, setpoints: Mapping[str, Pose], time_s: float) -> TissueState:
+    def track(
+        self, setpoints: Mapping[str, Pose], time_s: float, change_m: Floats | None = None
+    ) -> TissueState:
         with self._watch:
             surface = self.state.surface
             risen_m = surface.vertices_m + [0.0, 0.0, _BREATH_M * np.sin(time_s)]

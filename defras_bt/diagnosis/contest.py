@@ -24,6 +24,8 @@ _CLEARLY = 2.0
 """Of the threshold, for causes that are accepted together."""
 _ALONE = 0.8
 """Of what causes explain together."""
+_NEARLY_ASKED = 0.3
+"""Of the step at which the twin was asked: beginnings above it are tried there as well."""
 _WIDTH = 0.25
 """Of a parameter's step, to both sides, over which a derivative is measured."""
 
@@ -156,7 +158,16 @@ def accepted_of(
     if not fits:
         return False
     after = noise_after(search, fits, search.noise)
-    trials = [_trial(search, key, fit, after) for key, fit in fits.items()]
+    trials = []
+    for key, fit in fits.items():
+        trial = _trial(search, key, fit, after)
+        if trial.held_out <= limit and _fits_better(search, fit, after, limit):
+            # Derivatives led along from where the fit began may be far from those where it arrived,
+            # and what they make of other folds then says nothing of the fit.
+            widths = np.full(len(fit.free), _WIDTH)
+            fits[key] = differentiate(search.counted, fit, widths)
+            trial = _trial(search, key, fits[key], after)
+        trials.append(trial)
     trials.sort(key=lambda trial: -trial.held_out)
     accepted = next((t for t in trials if t.held_out > limit and t.practical), None)
     search.rounds.append(Round(tuple(trials), limit, None if accepted is None else accepted.key))
@@ -171,16 +182,30 @@ def accepted_of(
     return True
 
 
+def _fits_better(search: Search, fit: Fit, noise: Noise, limit: float) -> bool:
+    """Whether a fit is better than the present one on the data that it was fitted to."""
+    before, after = (
+        float((noise.whiten(np.nan_to_num(each.residual)[:, None]) ** 2).sum())
+        for each in (search.fit, fit)
+    )
+    return before > (1.0 + limit) * after
+
+
 def _start(search: Search, now: Board, found: Products, key: str) -> Addition:
     """How a cause should begin. Far from null a linearised model is not to be trusted: a soft
-    spring that pulls a little may look like a firm one that holds. So of beginnings of different
-    size the twin itself says which is best."""
+    spring that pulls a little may look like a firm one that holds, and one that lets go by three
+    quarters still holds. So of beginnings of different size, and of those at which the twin was
+    asked to rank them, it says itself which is best."""
     candidate = search.sketch.candidate(key)
-    starts = [
-        Addition(candidate, option, amplitudes) for option, amplitudes in starts_of(now, found, key)
-    ]
+    found_starts = starts_of(now, found, key)
+    starts = [Addition(candidate, option, amplitudes) for option, amplitudes in found_starts]
     if len(starts) == 1:
         return starts[0]
+    starts += [
+        Addition(candidate, option, np.ones(1))
+        for option, amplitudes in found_starts
+        if len(amplitudes) == 1 and _NEARLY_ASKED < amplitudes[0] != 1.0
+    ]
     models = [added(search.fit.model, candidate, one.values(1.0)) for one in starts]
     search.counted.foresee(models)
 
@@ -204,8 +229,8 @@ def _settled(search: Search, key: str, noise: Noise) -> Fit:
 
 
 def _retuned(search: Search, fit: Fit, held_out: HeldOut, *without: str) -> Floats:
-    """The residual (n,) of ``fit`` with all its parameters and nuisances re-tuned."""
-    columns = np.concatenate((fit.jacobian, search.nuisance_columns(*without)), axis=1)
+    """The residual (n,) of ``fit`` with its strengths and nuisances re-tuned."""
+    columns = search.tuned_columns(fit, *without)
     return np.asarray(fit.residual - columns @ held_out.loss.amplitudes[:, 0])
 
 

@@ -29,6 +29,8 @@ from defras_bt.diagnosis.verdict_building import diagnosis_of
 from defras_sim.effects.effect import EffectParameter, Values
 from defras_sim.geometry import Floats
 
+_FAR_ABOVE = 3.0
+"""Of what chance reaches: no interval makes a cause doubtful that is above it."""
 _NARROWEST, _WIDEST = 0.02, 2.0
 """Steps over which derivatives are taken."""
 
@@ -125,8 +127,21 @@ def _settle(found: Findings, told: Progress) -> None:
 
 def _may_be_absent(found: Findings, key: str) -> bool:
     """Whether the intervals of all of a cause's strengths contain their null: a name for what may
-    as well not be there helps nobody."""
-    candidate = found.search.sketch.candidate(key)
+    as well not be there helps nobody.
+
+    An interval is that of the derivatives where the fit arrived. Where a little more or less of a
+    firm hold changes nothing it is as wide as the bounds, and says nothing of none at all; so a
+    cause without which other data are predicted far worse stays.
+    """
+    search = found.search
+    candidate = search.sketch.candidate(key)
+    less = bare(search.counted, search.fit, key)
+    worse = search.held_out(less, search.noise).total / (
+        search.held_out(search.fit, search.noise).total
+    )
+    limits = [each.threshold for each in search.rounds if each.accepted == key]
+    if limits and worse - 1.0 > _FAR_ABOVE * limits[-1]:
+        return False
     strengths = [p for p in candidate.free if p.strength]
     estimated = found.estimates[key]
 

@@ -74,10 +74,19 @@ class Search:
         return np.concatenate([np.zeros((size, 0)), *[o.columns for o in options]], axis=1)
 
     def held_out(self, fit: Fit, noise: Noise, *without: str) -> HeldOut:
-        """``fit`` with every fold predicted from the others, nuisances re-tuned."""
-        columns = np.concatenate((fit.jacobian, self.nuisance_columns(*without)), axis=1)
-        folds = self.samples.fold
-        return hold_out(fit.residual, columns, noise, folds, len(fit.free), self.fitted_with)
+        """``fit`` with every fold predicted from the others, strengths and nuisances re-tuned."""
+        columns = self.tuned_columns(fit, *without)
+        kept = sum(p.strength for _, p in fit.free)
+        return hold_out(fit.residual, columns, noise, self.samples.fold, kept, self.fitted_with)
+
+    def tuned_columns(self, fit: Fit, *without: str) -> Floats:
+        """Columns (n, k) of what is re-tuned in other data: strengths, then nuisances.
+
+        Where and when something is stays as it was fitted, as it does where chance is measured:
+        what is seen in one fold alone cannot be found without it.
+        """
+        strengths = np.array([p.strength for _, p in fit.free], dtype=bool)
+        return np.concatenate((fit.jacobian[:, strengths], self.nuisance_columns(*without)), axis=1)
 
     def approximations(self, count: int) -> Floats | None:
         """Draws (n, count) of what the twin itself may be off by, where it is known."""

@@ -97,7 +97,7 @@ def _rejected(search: Search, key: str, rival: str, fit: Fit) -> bool:
     """Whether data made by ``rival`` would hardly ever speak for ``key`` as the measured do."""
     mine = search.fit
     columns = {
-        name: np.concatenate((one.jacobian, search.nuisance_columns(key, rival)), axis=1)
+        name: search.tuned_columns(one, key, rival)
         for name, one in (("mine", mine), ("rival", fit))
     }
     noise, fold = search.noise, search.samples.fold

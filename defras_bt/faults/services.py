@@ -20,7 +20,7 @@ from defras_bt.planning.plan import GridPoint, Plan, Situation
 from defras_bt.planning.planner import Planner
 from defras_bt.planning.program import PlanningTimeout
 from defras_bt.recording.record import Recorder, RunInfo, RunSummary, TickRecord
-from defras_sim.geometry import Pose
+from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import Scene
 from defras_sim.tissue.state import TissueState
 from defras_sim.twin import Twin
@@ -38,8 +38,10 @@ class FaultyTwin(Twin):
     def force_n(self) -> float:
         return float("nan") if self._lost else super().force_n
 
-    def track(self, setpoints: Mapping[str, Pose], time_s: float) -> TissueState:
-        state = super().track(setpoints, time_s)
+    def track(
+        self, setpoints: Mapping[str, Pose], time_s: float, change_m: Floats | None = None
+    ) -> TissueState:
+        state = super().track(setpoints, time_s, change_m)
         self._lost = any(fault.active(time_s) for fault in self._faults)
         return replace(state, converged=False) if self._lost else state
 

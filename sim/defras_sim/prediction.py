@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from defras_sim.effects.camera_layer import CameraLayer
 from defras_sim.effects.layers import Layers
 from defras_sim.geometry import Floats, Pose
+from defras_sim.known_way import KnownWay
 from defras_sim.recorded_motion import RecordedMotion
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
@@ -49,10 +50,18 @@ class Prediction:
         lost = np.full(shape, np.nan)
         return np.stack([s.surface.vertices_m if s.converged else lost for s in self.states])
 
+    @cached_property
+    def way(self) -> KnownWay | None:
+        """Where its nodes went, for models that differ little; None where it could not follow."""
+        known = [index for index, state in enumerate(self.states) if state.converged]
+        if not known:
+            return None
+        return KnownWay(self.time_s[known], np.stack([self.states[i].nodes_m for i in known]))
+
     @property
     def nbytes(self) -> int:
         """About how much memory it takes: the shapes, and once more where they were asked for."""
-        return sum(s.nodes_m.nbytes + 2 * s.surface.vertices_m.nbytes for s in self.states)
+        return sum(2 * s.nodes_m.nbytes + 2 * s.surface.vertices_m.nbytes for s in self.states)
 
     def force_n(self, arm: str) -> Floats:
         """Force (m, 3) of a jaw on the tissue; 0 without a grip, NaN where the state is stale."""
@@ -89,12 +98,14 @@ def predict(
     motion: RecordedMotion,
     rows: Integers | None = None,
     read: Integers | None = None,
+    like: KnownWay | None = None,
 ) -> Prediction:
     """What the twin of ``scene``, with the effects it adopts, does along ``motion``.
 
     The arms follow every instant; the tissue is solved at ``rows`` of them (all of them, where
     none are given), around what clouds of their stamps show, and where a grip begins or ends. The
     encoders are read at ``read`` (where the tissue is solved, where none are given).
+    ``like`` is the way that a similar model went, on the same mesh; it saves work.
     Effects of history are integrated between solved instants. A model that was lost three times in
     a row is not asked again until a grip begins or ends.
 
@@ -119,6 +130,7 @@ def predict(
     states: list[TissueState] = []
     measured: dict[str, list[Pose]] = {name: [] for name in motion.arms}
     lost = 0
+    solved_s = float(motion.time_s[0])
     for row in range(last + 1):
         time_s, tips = float(motion.time_s[row]), motion.tips(row)
         if not wanted[row]:
@@ -127,8 +139,10 @@ def predict(
             if _regripped(twin, motion, row):
                 lost = 0
             if lost < MOST_LOST:
-                states.append(twin.track(tips, time_s))
+                change_m = None if like is None else like.change_m(solved_s, time_s)
+                states.append(twin.track(tips, time_s, change_m))
                 lost = 0 if states[-1].converged else lost + 1
+                solved_s = time_s
             else:
                 twin.follow(tips, time_s)
                 states.append(states[-1])

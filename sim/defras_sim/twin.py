@@ -12,7 +12,7 @@ from defras_sim.effects.camera_layer import CameraLayer
 from defras_sim.effects.camera_registration import EFFECT as REGISTRATION
 from defras_sim.effects.extended_tissue import ExtendedTissue
 from defras_sim.effects.layers import Layers
-from defras_sim.geometry import Pose
+from defras_sim.geometry import Floats, Pose
 from defras_sim.held_motion import HeldMotion
 from defras_sim.scene import RIGID_HOLE_N_PER_M, ModelExtension, Scene
 from defras_sim.tissue.model import NothingToGrasp
@@ -144,11 +144,14 @@ class Twin:
             {arm: pose for arm, pose in setpoints.items() if _is_finite(pose)}, self._time_s
         )
 
-    def track(self, setpoints: Mapping[str, Pose], time_s: float) -> TissueState:
+    def track(
+        self, setpoints: Mapping[str, Pose], time_s: float, change_m: Floats | None = None
+    ) -> TissueState:
         """Predict the tissue for the arms' setpoints (tissue_from_tip) at world time ``time_s``.
 
         Nothing is solved if no held patch moved and the tissue is none that changes with time.
         Where the model cannot follow, the last good state comes back with ``converged`` False.
+        ``change_m`` (nodes, 3): about how far the nodes go, where that is known; it saves work.
 
         Raises:
             ValueError: a holding arm has no setpoint, or it is not finite.
@@ -163,8 +166,8 @@ class Twin:
             wanted = self._motion.held(self._time_s, self._state.grasp_forces_n)
             if not due and all(_same(wanted[arm], self._jaws[arm]) for arm in wanted):
                 break
-            self._solve(wanted)
-            due = False
+            self._solve(wanted, change_m)
+            due, change_m = False, None
             if not self._motion.gives or not self._state.converged:
                 break
         return self._state
@@ -223,9 +226,9 @@ class Twin:
         if time_s is not None:
             self._time_s = max(self._time_s, time_s)
 
-    def _solve(self, jaws: Mapping[str, Pose]) -> TissueState:
+    def _solve(self, jaws: Mapping[str, Pose], change_m: Floats | None = None) -> TissueState:
         self._jaws = dict(jaws)
-        self._state = self._tissue.solve(self._jaws, self._time_s)
+        self._state = self._tissue.solve(self._jaws, self._time_s, change_m)
         return self._state
 
     def _at_once(self, before: Mask, after: Mask) -> bool:

@@ -75,12 +75,12 @@ def test_cases_are_of_known_effects_and_all_different(twin: TwinName) -> None:
 
 def test_a_hidden_law_of_a_specimen_is_found_and_outside_where_it_is_lacking() -> None:
     found = board_row(
-        BoardCase("one", "coupon", ("stress_relaxation",), 0), coarse=True, baselines=False
+        BoardCase("one", "coupon", ("stress_relaxation",), 0), further=False, baselines=False
     )
     assert found.named == ["stress_relaxation"]
     assert found.covered
     lacking = board_row(
-        BoardCase("lacking", "coupon", ("stress_relaxation",), 500), coarse=True, baselines=False
+        BoardCase("lacking", "coupon", ("stress_relaxation",), 500), further=False, baselines=False
     )
     assert lacking.verdict == "outside"
     assert lacking.named == []

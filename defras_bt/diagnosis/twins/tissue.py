@@ -184,7 +184,10 @@ class TissueProblem:
             for each, assigned, its in zip(self.trajectories, self.assigned, frames, strict=True)
         ]
         tolerance = tolerances(self.samples)
-        return TissueTangents(self.scene, whole, parts, candidates, tolerance, self._jobs, shapes)
+        ways = self._models.ways(model)
+        return TissueTangents(
+            self.scene, whole, parts, candidates, tolerance, self._jobs, ways, shapes
+        )
 
     def _blocks(self, frames: Sequence[TissueFrames]) -> list[Floats]:
         """Residuals (rows, frames) of every trajectory."""

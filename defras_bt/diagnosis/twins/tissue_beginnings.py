@@ -16,13 +16,14 @@ ONSETS, FINE_ONSETS = 4, 16
 is as easily begun at many times as at few."""
 STRONG = {
     "attachment_tear": 1.0,
+    "bed_adhesion": 20.0,
     "extra_attachment": 0.9,
     "inclusion": 4.0,
     "missing_attachment": 1.0,
 }
-"""Effects of a place whose beginning says little of how they end: a soft spring under tissue that
-is lifted far pulls ever more, a firm one holds it. The strength at which they are tried in full, at
-the places that explain the residual best."""
+"""Effects whose beginning says little of how they end: a soft spring under tissue that is lifted
+far pulls ever more, a firm one holds it; tissue that sticks a little is soon off. The strength at
+which they are tried in full; those of a place where they explain the residual best."""
 PLACES_TRIED = 2
 PROMISING = 0.02
 """Share of the residual's squares that a place has to explain to be tried in full."""

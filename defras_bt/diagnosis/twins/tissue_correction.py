@@ -14,8 +14,10 @@ import numpy as np
 from defras_bt.diagnosis.twins.tissue_frames import TissueFrames
 from defras_bt.diagnosis.twins.tissue_keyframes import Keyframes
 from defras_sim.geometry import Floats
+from defras_sim.known_way import KnownWay
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
+from defras_sim.tissue.tissue_mesh import tissue_mesh
 
 _FINER = 2
 """Elements along x and y for each one of the twin's."""
@@ -29,6 +31,17 @@ def finer(scene: Scene) -> Scene | None:
     nx, ny, nz = tissue.elements_xyz
     elements = {"elements_xyz": (_FINER * nx, _FINER * ny, nz)}
     return scene.model_copy(update={"tissue": tissue.model_copy(update=elements)})
+
+
+def finer_way(way: KnownWay | None, scene: Scene, fine: Scene) -> KnownWay | None:
+    """The ``way`` of the tissue of ``scene``, as the nodes of the ``fine`` one's go."""
+    if way is None:
+        return None
+    coarse_mesh, fine_mesh = (
+        tissue_mesh(each.tissue, each.tissue.element, each.tissue.elements_xyz)
+        for each in (scene, fine)
+    )
+    return way.between_nodes(coarse_mesh.interpolation(fine_mesh.nodes_m))
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from defras_sim.effects.effect import Extension, Values
 from defras_sim.effects.layers import Layers
 from defras_sim.effects.tissue_effect import NoSuchTissue
 from defras_sim.geometry import Floats, Pose
+from defras_sim.known_way import KnownWay
 from defras_sim.prediction import Prediction, predict
 from defras_sim.scene import Scene
 from defras_sim.surface import Surface
@@ -56,18 +57,23 @@ def before_the_camera(model: Extension) -> dict[str, Values]:
 
 
 def led_along(
-    scene: Scene, model: Extension, trajectory: Trajectory, solved: Integers | None = None
+    scene: Scene,
+    model: Extension,
+    trajectory: Trajectory,
+    solved: Integers | None = None,
+    like: KnownWay | None = None,
 ) -> Prediction | None:
     """What tissue and arms do along ``trajectory`` as ``scene`` says, with all effects of ``model``
     and none of the scene's; None where no tissue can be like that, or a jaw would take none.
 
     The tissue is solved at the instants ``solved``, where none are given at
-    :attr:`Trajectory.solved`. Camera and clock are left out.
+    :attr:`Trajectory.solved`. Camera and clock are left out. ``like``: the way that a similar model
+    went on the same mesh, which saves work.
     """
     rows = trajectory.solved if solved is None else solved
     try:
         plain = scene.extended(before_the_camera(model))
-        return predict(plain, trajectory.motion, rows, trajectory.frames)
+        return predict(plain, trajectory.motion, rows, trajectory.frames, like)
     except (NothingToGrasp, NoSuchTissue):
         return None
 

@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 
 from defras_bt.diagnosis.problem import Integers
 from defras_bt.diagnosis.recording_reader import UnusableRecording
-from defras_bt.diagnosis.twins.tissue_correction import MeshCorrection, finer
+from defras_bt.diagnosis.twins.tissue_correction import MeshCorrection, finer, finer_way
 from defras_bt.diagnosis.twins.tissue_first_jobs import first_jobs, key_shapes
 from defras_bt.diagnosis.twins.tissue_frames import (
     TissueFrames,
@@ -23,6 +23,7 @@ from defras_bt.diagnosis.twins.tissue_part import KeyShapes
 from defras_bt.diagnosis.twins.tissue_passes import led
 from defras_bt.diagnosis.twins.tissue_trajectory import Trajectory
 from defras_sim.effects.effect import Effect, Extension, Values
+from defras_sim.known_way import KnownWay
 from defras_sim.prediction import Prediction
 from defras_sim.scene import Scene
 
@@ -79,6 +80,17 @@ class LedModels:
             )
         )
 
+    def ways(self, model: Extension) -> tuple[KnownWay | None, ...]:
+        """Where the nodes of ``model``, or of the one led along last, went in every trajectory."""
+        led = self._led.get(self._key(model)) or self._last
+        return tuple(None if each is None else each.way for each in led)
+
+    @property
+    def _last(self) -> tuple[Prediction | None, ...]:
+        """Of the model that was asked for last and could be followed."""
+        followed = (led for led in reversed(self._led.values()) if led is not None)
+        return next(followed, (None,) * len(self._trajectories))
+
     def foresee(self, models: Sequence[Extension]) -> None:
         """Lead several models along at once, before they are asked for one by one."""
         wanted = {self._key(model): model for model in models if self._key(model) not in self._led}
@@ -90,12 +102,15 @@ class LedModels:
 
     def _lead_along(self, models: Mapping[str, Extension]) -> None:
         """Predict tissue and arms of ``models`` by key, side by side, and remember them."""
+        near = [None if each is None else each.way for each in self._last]
         work = [
-            (self.whole(model), each) for model in models.values() for each in self._trajectories
+            (self.whole(model), each, way)
+            for model in models.values()
+            for each, way in zip(self._trajectories, near, strict=True)
         ]
         jobs = self._jobs if len(work) > 1 else 1
         found = Parallel(n_jobs=jobs, inner_max_num_threads=1)(
-            delayed(led_along)(self._scene, whole, each) for whole, each in work
+            delayed(led_along)(self._scene, whole, each, None, way) for whole, each, way in work
         )
         count = len(self._trajectories)
         for number, key in enumerate(models):
@@ -122,43 +137,38 @@ class LedModels:
     ) -> tuple[list[TissueFrames], tuple[MeshCorrection, ...], list[KeyShapes]]:
         """The plain model's frames, what a finer mesh would change of them, and shapes.
 
-        All of it at once; the finer mesh takes longest, and begins first.
+        What the plain model says is a guide for all that comes after; of that the finer mesh takes
+        longest, and begins first.
         """
         scene, whole, fine = self._scene, self.whole({}), finer(self._scene)
-        scenes = [scene] if fine is None else [fine, scene]
-        jobs = [
-            job
-            for each in self._trajectories
-            for job in first_jobs(scene, whole, each, tuple(effects.values()))
-        ]
-        found = Parallel(n_jobs=self._jobs, inner_max_num_threads=1)(
-            [
-                *(
-                    delayed(led_along)(s, whole, each, None if s is scene else _sparse(each))
-                    for s in scenes
-                    for each in self._trajectories
-                ),
-                *(delayed(led)(job, effects) for job in jobs),
-            ]
+        predicted = list(
+            Parallel(n_jobs=self._jobs, inner_max_num_threads=1)(
+                delayed(led_along)(scene, whole, each) for each in self._trajectories
+            )
         )
-        count = len(self._trajectories)
-        predicted = found[: count * len(scenes)]
-        self._remember(self._key({}), predicted[-count:])
-        plain: list[TissueFrames] = []
-        corrections: list[MeshCorrection] = []
-        for each, one, other in zip(
-            self._trajectories, predicted[-count:], predicted[:count], strict=True
-        ):
-            if one is None:
-                raise UnusableRecording(
-                    f"{each.name}: the model cannot repeat a grasp that was recorded; it has no "
-                    "tissue there. Is the scene that of this recording, and are its frames right?"
-                )
-            plain.append(frames_of(one, scene, whole, each))
-            if all(surface is None for surface in plain[-1].surfaces):
-                raise UnusableRecording(f"{each.name}: the model finds no equilibrium in any frame")
-            corrections.append(self._correction(one, None if fine is None else other, each))
-        return plain, tuple(corrections), key_shapes(found[count * len(scenes) :], count)
+        plain = [
+            _followed(one, scene, whole, each)
+            for one, each in zip(predicted, self._trajectories, strict=True)
+        ]
+        self._remember(self._key({}), predicted)
+        ways = list(zip(self._trajectories, self.ways({}), strict=True))
+        refined = [
+            delayed(led_along)(fine, whole, each, _sparse(each), finer_way(way, scene, fine))
+            for each, way in ways
+            if fine is not None
+        ]
+        jobs = [
+            delayed(led)(job, effects)
+            for each, way in ways
+            for job in first_jobs(scene, whole, each, tuple(effects.values()), way)
+        ]
+        found = Parallel(n_jobs=self._jobs, inner_max_num_threads=1)([*refined, *jobs])
+        others = found[: len(refined)] or [None] * len(self._trajectories)
+        corrections = tuple(
+            self._correction(one, other, each)
+            for one, other, each in zip(predicted, others, self._trajectories, strict=True)
+        )
+        return plain, corrections, key_shapes(found[len(refined) :], len(self._trajectories))
 
     def _correction(
         self, coarse: Prediction, fine: Prediction | None, trajectory: Trajectory
@@ -170,6 +180,21 @@ class LedModels:
             return MeshCorrection.none(one)
         other = frames_of(fine, self._scene, model, trajectory)
         return MeshCorrection.between(one, other, keyframes(trajectory))
+
+
+def _followed(
+    prediction: Prediction | None, scene: Scene, whole: Extension, trajectory: Trajectory
+) -> TissueFrames:
+    """The frames of the plain model, which has to be able to follow."""
+    if prediction is None:
+        raise UnusableRecording(
+            f"{trajectory.name}: the model cannot repeat a grasp that was recorded; it has no "
+            "tissue there. Is the scene that of this recording, and are its frames right?"
+        )
+    frames = frames_of(prediction, scene, whole, trajectory)
+    if all(surface is None for surface in frames.surfaces):
+        raise UnusableRecording(f"{trajectory.name}: the model finds no equilibrium in any frame")
+    return frames
 
 
 def _sparse(trajectory: Trajectory) -> Integers:

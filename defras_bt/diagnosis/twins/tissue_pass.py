@@ -20,6 +20,7 @@ from defras_sim.effects.layers import Layers
 from defras_sim.effects.tissue_effect import Direction, TissueEffect
 from defras_sim.geometry import Floats, Pose
 from defras_sim.held_motion import HeldMotion
+from defras_sim.known_way import KnownWay
 from defras_sim.scene import Scene
 from defras_sim.tissue.parameters import Parameter, TipMotion
 from defras_sim.tissue.sensitivity import Sensitivities
@@ -55,6 +56,7 @@ class PassJob:
     """What a process needs to know.
 
     ``model``: all effects, the scene's included. ``chosen`` (k,): keyframes by index of the frame.
+    ``like``: the way that a similar model went, which saves work.
     ``watched``: effects of the tissue that go along. ``aside_m`` (2,): how far beside its place
     each jaw takes the tissue, and keeps it.
     """
@@ -63,6 +65,7 @@ class PassJob:
     model: Extension
     trajectory: Trajectory
     chosen: Integers
+    like: KnownWay | None = None
     watched: tuple[str, ...] = ()
     aside_m: tuple[float, float] = (0.0, 0.0)
     derivatives: bool = True
@@ -87,7 +90,8 @@ def run_pass(job: PassJob, known: Mapping[str, Effect]) -> tuple[KeyShape | None
         stops |= set((np.flatnonzero(arm.grasped[1:] != arm.grasped[:-1]) + 1).tolist())
     shapes: dict[int, KeyShape | None] = {}
     aside = np.array([*job.aside_m, 0.0])
-    state = tissue.solve({}, float(motion.time_s[0]))
+    solved_s = float(motion.time_s[0])
+    state = tissue.solve({}, solved_s)
     holding: list[str] = []
     for row in range(int(wanted[-1]) + 1):
         time_s = float(motion.time_s[row])
@@ -102,7 +106,9 @@ def run_pass(job: PassJob, known: Mapping[str, Effect]) -> tuple[KeyShape | None
                 tissue.release(name)
                 held.let_go(name)
                 holding.remove(name)
-        state = _solved(tissue, held, state, time_s, aside)
+        change_m = None if job.like is None else job.like.change_m(solved_s, time_s)
+        state = _solved(tissue, held, state, time_s, aside, change_m)
+        solved_s = time_s
         shapes[row] = None
         if row in stops and state.converged:
             shapes[row] = _shape(tissue, state, holding, tuple(watched), job.derivatives)
@@ -110,14 +116,20 @@ def run_pass(job: PassJob, known: Mapping[str, Effect]) -> tuple[KeyShape | None
 
 
 def _solved(
-    tissue: ExtendedTissue, held: HeldMotion, state: TissueState, time_s: float, aside: Floats
+    tissue: ExtendedTissue,
+    held: HeldMotion,
+    state: TissueState,
+    time_s: float,
+    aside: Floats,
+    change_m: Floats | None,
 ) -> TissueState:
     """The equilibrium at ``time_s``; an arm that gives way rests where tissue and arm agree."""
     for _ in range(_GIVING_ROUNDS):
         jaws: dict[str, Pose] = {
             arm: jaw.moved(aside) for arm, jaw in held.held(time_s, state.grasp_forces_n).items()
         }
-        state = tissue.solve(jaws, time_s)
+        state = tissue.solve(jaws, time_s, change_m)
+        change_m = None
         if not held.gives or not state.converged:
             break
     return state

@@ -86,8 +86,9 @@ class Planner:
             for c in candidates
             if isinstance(c.effect, TissueEffect)
         ]
+        ways = [predicted.way]
         known = TissueTangents(
-            self.scene, model, [part], candidates, tolerance, self.jobs, wanted=wanted
+            self.scene, model, [part], candidates, tolerance, self.jobs, ways, wanted=wanted
         )
         peak = max(frames.largest_force_n, known.largest_force_n)
         samples = _samples(self.samples.channels, way)

@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from defras_bt.diagnosis.problem import Candidate, Tangent
 from defras_bt.diagnosis.twins.tissue_beginnings import (
     ONSET,
@@ -22,12 +20,15 @@ from defras_bt.diagnosis.twins.tissue_beginnings import (
     is_there,
     standing,
 )
+from defras_bt.diagnosis.twins.tissue_gains import Gains
 from defras_bt.diagnosis.twins.tissue_part import TissuePart, with_values
 from defras_bt.diagnosis.twins.tissue_pass import KeyShape, PassJob
 from defras_bt.diagnosis.twins.tissue_passes import run_passes
 from defras_sim.effects.effect import Effect, Extension
-from defras_sim.geometry import Floats
+from defras_sim.known_way import KnownWay
 from defras_sim.scene import Scene
+
+_PLACE = ("x_m", "y_m")
 
 
 @dataclass(frozen=True)
@@ -51,13 +52,11 @@ def wanted_of(
     candidate: Candidate,
     model: Extension,
     known: Sequence[Tangent],
-    parts: Sequence[TissuePart],
-    tolerance: Floats,
+    gains: Gains,
 ) -> Iterator[Wanted]:
     """In which ways ``candidate``, an effect of the tissue, should be led along beside ``model``.
 
-    ``known``: its beginnings that have derivatives. ``tolerance`` (rows,): what is small in each
-    row.
+    ``known``: its beginnings that have derivatives.
     """
     (p, *_) = [p for p in candidate.free if p.strength]
     if not known:
@@ -67,7 +66,8 @@ def wanted_of(
         step = {p.name: STRONG[candidate.effect.name] - p.null}
         onset = ONSET.get(candidate.effect.name)
         places: list[Mapping[str, float]] = []
-        for tangent in _best(known, parts, tolerance):
+        placed = any(p.name in _PLACE for p in candidate.free)
+        for tangent in gains.best(known, PROMISING if placed else -1.0):
             # What begins at one time is what was there from the start, cut off before that time.
             at = dict(tangent.at) if onset is None else {**tangent.at, onset: 0.0}
             if at not in places and len(places) < PLACES_TRIED:
@@ -81,9 +81,11 @@ def repeats(
     parts: Sequence[TissuePart],
     candidates: Sequence[Candidate],
     wanted: Sequence[Wanted],
+    ways: Sequence[KnownWay | None],
     jobs: int,
 ) -> list[Repeat]:
-    """Models with what is ``wanted`` of ``candidates``, led along on ``jobs`` processes."""
+    """Models with what is ``wanted`` of ``candidates``, led along on ``jobs`` processes. ``ways``:
+    that of a similar model in every part, where it is known."""
     effect = {candidate.key: candidate.effect for candidate in candidates}
     work = [
         PassJob(
@@ -91,10 +93,11 @@ def repeats(
             with_values(model, effect[one.key].name, _there(one)),
             part.trajectory,
             part.keyframes.chosen,
+            way,
             derivatives=False,
         )
         for one in wanted
-        for part in parts
+        for part, way in zip(parts, ways, strict=True)
     ]
     known: dict[str, Effect] = {each.name: each for each in effect.values()}
     found = run_passes(work, known, jobs)
@@ -108,20 +111,3 @@ def repeats(
 def _there(wanted: Wanted) -> dict[str, float]:
     moved = {name: wanted.at[name] + change for name, change in wanted.step.items()}
     return {**wanted.at, **moved}
-
-
-def _best(
-    tangents: Sequence[Tangent], parts: Sequence[TissuePart], tolerance: Floats
-) -> list[Tangent]:
-    """Those along which the residual would fall, the best first."""
-    scale = np.concatenate([np.repeat(tolerance, part.shape[1]) for part in parts])
-    residual = np.nan_to_num(np.concatenate([part.residual.ravel() for part in parts]) / scale)
-
-    def gain(tangent: Tangent) -> float:
-        column: Floats = np.nan_to_num(tangent.columns[:, 0] / scale)
-        along = max(float(column @ residual), 0.0)
-        return along**2 / max(float(column @ column), 1e-12)
-
-    worth = PROMISING * float(residual @ residual)
-    promising = [tangent for tangent in tangents if gain(tangent) > worth]
-    return sorted(promising, key=gain, reverse=True)

@@ -24,12 +24,15 @@ from defras_bt.diagnosis.twins.tissue_beginnings import (
     standing,
 )
 from defras_bt.diagnosis.twins.tissue_first_jobs import first_jobs, key_shapes
+from defras_bt.diagnosis.twins.tissue_gains import Gains
+from defras_bt.diagnosis.twins.tissue_onsets import Onsets
 from defras_bt.diagnosis.twins.tissue_part import KeyShapes, TissuePart, with_values
 from defras_bt.diagnosis.twins.tissue_passes import run_passes
 from defras_bt.diagnosis.twins.tissue_repeats import Wanted, repeats, wanted_of
 from defras_sim.effects.effect import Extension
 from defras_sim.effects.tissue_effect import TissueEffect
 from defras_sim.geometry import Floats
+from defras_sim.known_way import KnownWay
 from defras_sim.scene import Scene
 
 
@@ -44,25 +47,29 @@ class TissueTangents:
         candidates: Sequence[Candidate],
         tolerance: Floats,
         jobs: int,
+        ways: Sequence[KnownWay | None],
         shapes: Sequence[KeyShapes] = (),
         wanted: Sequence[Wanted] | None = None,
     ) -> None:
         """``tolerance`` (rows,): what is small in each row. ``jobs`` processes work at once.
+        ``ways``: where the model's nodes, or those of a similar one, went in every part.
         ``shapes`` of every trajectory, where the model was led along already. ``wanted``: what is
         led along in full; where not given, what derivatives do not tell enough of."""
         self._scene, self._model, self._parts = scene, model, tuple(parts)
         self._effects = {c.effect.name: c.effect for c in candidates}
-        self._shapes = list(shapes) or self._led_along(jobs)
+        self._shapes = list(shapes) or self._led_along(ways, jobs)
+        gains = Gains(self._parts, tolerance)
+        self._onsets = Onsets(self._parts, gains)
         if wanted is None:
             wanted = [
                 one
                 for candidate in candidates
                 if isinstance(candidate.effect, TissueEffect)
                 for one in wanted_of(
-                    candidate, model, tuple(self._differentiated(candidate)), self._parts, tolerance
+                    candidate, model, tuple(self._differentiated(candidate)), gains
                 )
             ]
-        self._repeats = repeats(scene, model, self._parts, candidates, wanted, jobs)
+        self._repeats = repeats(scene, model, self._parts, candidates, wanted, ways, jobs)
 
     @property
     def largest_force_n(self) -> float:
@@ -124,12 +131,20 @@ class TissueTangents:
             yield self._smooth(candidate, self._carry)
             return
         (p, *_) = [p for p in candidate.free if p.strength]
-        for start in self._onsets_s(ONSETS) if onset else (None,):
-            begun = at if onset is None or start is None else {**at, onset: start}
-            for times in SLACK.get(name, (1.0,)):
-                step = times * p.step
-                column = self._carry(name, {**begun, p.name: begun[p.name] + step})
-                yield Tangent(begun, ({p.name: step},), column[:, None])
+        for times in SLACK.get(name, (1.0,)):
+            step = times * p.step
+            there = {**at, p.name: at[p.name] + step}
+            if onset is None:
+                yield Tangent(at, ({p.name: step},), self._carry(name, there)[:, None])
+                continue
+
+            def carried(
+                start: float, onset: str = onset, there: dict[str, float] = there
+            ) -> Floats:
+                return self._carry(name, {**there, onset: start})
+
+            for start, column in self._onsets.columns(ONSETS, carried):
+                yield Tangent({**at, onset: start}, ({p.name: step},), column[:, None])
 
     def _differentiated(self, candidate: Candidate) -> Iterator[Tangent]:
         """One tangent for each place at which the effect could begin."""
@@ -162,8 +177,8 @@ class TissueTangents:
             if onset is None or is_there(self._model, candidate):
                 yield Tangent(at, steps, columns)
                 continue
-            for start in self._onsets_s(ONSETS):
-                yield Tangent({**at, onset: start}, steps, self._from(start) * columns)
+            for start in self._onsets.spread(ONSETS):
+                yield Tangent({**at, onset: start}, steps, self._from(start)[:, None] * columns)
 
     def _repeated(self, candidate: Candidate) -> Iterator[Tangent]:
         for repeat in self._repeats:
@@ -175,45 +190,36 @@ class TissueTangents:
                     self._parts, self._shapes, repeat.shapes, strict=True
                 )
             ]
-            at, step, column = repeat.wanted.at, repeat.wanted.step, np.concatenate(blocks)[:, None]
+            at, step, whole = repeat.wanted.at, repeat.wanted.step, np.concatenate(blocks)
             onset = ONSET.get(candidate.effect.name)
             if onset is None or is_there(self._model, candidate):
-                yield Tangent(at, (step,), column)
+                yield Tangent(at, (step,), whole[:, None])
                 continue
-            for start in self._onsets_s(FINE_ONSETS):
-                yield Tangent({**at, onset: start}, (step,), self._from(start) * column)
+
+            def begun(start: float, whole: Floats = whole) -> Floats:
+                return self._from(start) * whole
+
+            for start, column in self._onsets.columns(FINE_ONSETS, begun):
+                yield Tangent({**at, onset: start}, (step,), column[:, None])
 
     def _from(self, start_s: float) -> Floats:
-        """1 in rows (n, 1) from ``start_s`` on, 0 before."""
+        """1 in rows (n,) from ``start_s`` on, 0 before."""
         begun = [
             np.broadcast_to(part.trajectory.time_s >= start_s, part.shape).ravel()
             for part in self._parts
         ]
-        return np.concatenate(begun)[:, None].astype(float)
+        return np.concatenate(begun).astype(float)
 
-    def _led_along(self, jobs: int) -> list[KeyShapes]:
+    def _led_along(self, ways: Sequence[KnownWay | None], jobs: int) -> list[KeyShapes]:
         """The model led along every trajectory: with derivatives, and with grips aside."""
         work = [
             job
-            for part in self._parts
+            for part, way in zip(self._parts, ways, strict=True)
             for job in first_jobs(
-                self._scene, self._model, part.trajectory, tuple(self._effects.values())
+                self._scene, self._model, part.trajectory, tuple(self._effects.values()), way
             )
         ]
         return key_shapes(run_passes(work, self._effects, jobs), len(self._parts))
-
-    def _onsets_s(self, count: int) -> list[float]:
-        """``count`` times spread over all in which tissue is held."""
-        held: list[Floats] = []
-        for part in self._parts:
-            motion = part.trajectory.motion
-            any_held = np.any([arm.grasped for arm in motion.arms.values()], axis=0)
-            held.append(motion.time_s[any_held])
-        times = np.sort(np.concatenate(held))
-        if len(times) == 0:
-            return []
-        at = np.linspace(0, len(times) - 1, count + 2)[1:-1]
-        return sorted({float(times[int(i)]) for i in at})
 
     def derivatives(self, candidate: Candidate) -> dict[str, Floats]:
         """Change (n,) per unit of those free parameters of a candidate that the model has, of which

@@ -84,18 +84,19 @@ class ExtendedTissue:
         due = [each.before(time_s) for each in self._evolutions.values()]
         return any(due)
 
-    def solve(self, tips: Tips, time_s: float) -> TissueState:
+    def solve(self, tips: Tips, time_s: float, change_m: Floats | None = None) -> TissueState:
         """Equilibrium at world time ``time_s``; see :meth:`TissueModel.solve`.
 
         Where the tissue tears and finds no rest afterwards, the state is stale.
         """
         if not self._evolutions:
-            return self.model.solve(tips)
+            return self.model.solve(tips, change_m)
         iterations = 0
         for _ in range(MOST_TEARS):
             self.is_due(time_s)
             self._put()
-            state = self.model.solve(tips)
+            state = self.model.solve(tips, change_m)
+            change_m = None
             iterations += state.iterations
             if not state.converged:
                 break

@@ -227,11 +227,12 @@ class TissueModel:
         self._hold(snapshot.grasps)
         self._positions_m = snapshot.positions_m.copy()
 
-    def solve(self, tips: Tips) -> TissueState:
+    def solve(self, tips: Tips, change_m: Floats | None = None) -> TissueState:
         """Equilibrium with each holding arm's tip at its pose in ``tips``.
 
         Where other holes hold than before, the way may have to start again from rest. If that does
-        not help, the state is the last good one, marked as not converged.
+        not help, the state is the last good one, marked as not converged. ``change_m`` (nodes, 3):
+        about how far the nodes go, where that is known; it saves work.
 
         Raises:
             ValueError: a holding arm has no pose, a pose is not finite, or an arm holds nothing.
@@ -239,7 +240,7 @@ class TissueModel:
         self._check(tips)
         before = self.snapshot()
         moving = length_m(self._held.tips, tips) > 0
-        converged, iterations = self._travel(tips)
+        converged, iterations = self._travel(tips, change_m)
         if not converged and not moving:
             unloaded = grips.unloaded(self._held.grasps, self.rest_m)
             self.restore(TissueSnapshot(self.rest_m, unloaded))
@@ -289,9 +290,9 @@ class TissueModel:
         self._held.hold(grasps)
         self._traveller.forget()
 
-    def _travel(self, tips: Tips) -> tuple[bool, int]:
+    def _travel(self, tips: Tips, change_m: Floats | None = None) -> tuple[bool, int]:
         """Go towards ``tips`` as far as there are equilibria; (arrived, iterations)."""
-        arrival = self._traveller.go(self._positions_m, self._held.tips, tips)
+        arrival = self._traveller.go(self._positions_m, self._held.tips, tips, change_m)
         self._positions_m = arrival.positions_m
         self._held.move(arrival.tips)
         return arrival.arrived, arrival.iterations

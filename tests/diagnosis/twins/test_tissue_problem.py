@@ -90,7 +90,7 @@ TANGENTS: Mapping[str, tuple[int, float, float]] = {
     "joint_offset@shaft": (0, 0.9, 0.4),
     "stiffness": (0, 0.95, 0.3),
     "stress_relaxation": (1, 0.8, 0.6),
-    "missing_attachment": (0, 0.9, 0.6),
+    "missing_attachment": (5, 0.98, 0.4),
 }
 
 
