@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from defras_sim.effects.effect import Extension
-from defras_sim.geometry import Pose
+from defras_sim.geometry import Floats, Pose
 from defras_sim.prediction import MOST_LOST, Prediction, predict
 from defras_sim.recorded_motion import ArmMotion, RecordedMotion
 from defras_sim.scene import Attachments, Roi, Scene
@@ -185,8 +185,10 @@ def test_a_model_that_is_lost_is_not_asked_for_ever(monkeypatch: pytest.MonkeyPa
     asked: list[float] = []
     solve = TissueModel.solve
 
-    def lost_when_lifted(model: TissueModel, tips: Mapping[str, Pose]) -> TissueState:
-        state = solve(model, tips)
+    def lost_when_lifted(
+        model: TissueModel, tips: Mapping[str, Pose], change_m: Floats | None = None
+    ) -> TissueState:
+        state = solve(model, tips, change_m)
         if not any(tip.position_m[2] > 0.005 for tip in tips.values()):
             return state
         asked.append(tips["psm1"].position_m[2])

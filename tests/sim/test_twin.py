@@ -141,7 +141,7 @@ def test_stale_where_the_model_cannot_follow(
     good = twin.state
     stale = replace(good, converged=False)
     with monkeypatch.context() as patched:
-        patched.setattr(TissueModel, "solve", lambda model, tips: stale)
+        patched.setattr(TissueModel, "solve", lambda model, tips, change_m=None: stale)
         state = twin.track({"psm1": down_at(-0.05, 0.02, 0.03)}, 2.0)
         assert not state.converged
         assert np.isnan(twin.force_n)
