@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -72,6 +73,26 @@ def confusion(rows: Sequence[BoardRow], twin: TwinName) -> list[dict[str, Any]]:
         line |= {f"({v})": sum(row.verdict == v for row in hidden) or "" for v in _OTHER}
         table.append(line)
     return table
+
+
+def in_words(rows: Sequence[BoardRow], twin: TwinName) -> list[dict[str, Any]]:
+    """The same as :func:`confusion` in words, for a narrow screen: what was said of each hidden
+    cause, the most frequent first."""
+    own = [row for row in rows if row.twin == twin and row.board in ("one", "nothing")]
+    table = []
+    for cause in (*CAUSES[twin], "nothing"):
+        hidden = [row for row in own if ("+".join(row.causes) or "nothing") == cause]
+        counted = Counter(_answer(row) for row in hidden)
+        if hidden:
+            answers = "; ".join(f"{words} {n}" for words, n in counted.most_common())
+            table.append({"hidden": cause, "runs": len(hidden), "said": answers})
+    return table
+
+
+def _answer(row: BoardRow) -> str:
+    if row.verdict == "set":
+        return f"set of {', '.join(row.alike)}"
+    return " + ".join(row.named) or row.verdict
 
 
 def is_right(row: BoardRow) -> bool:

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from defras_bt.benchmark.diagnosis_boards import boards
+from defras_bt.benchmark.diagnosis_boards import boards, in_words
 from defras_bt.benchmark.diagnosis_cases import BoardCase, board_cases
 from defras_bt.benchmark.diagnosis_runs import BoardRow, board_rows
 from defras_bt.benchmark.files import write_benchmark
@@ -78,10 +78,15 @@ def diagnosis(
     ]
     write_benchmark(out, "diagnosis", "What the diagnosis finds", tables, notes)
     file.unlink()
+    asked_rows = [row for row in rows if row.key in wanted and not row.error]
     for head, table in tables.items():
         if head in ("Every case", "Failed"):
             continue
-        Console().print(_turned(head, table) if head == "Score" else _table(head, table))
+        twin = next((each for each in asked if head.endswith(f": {each}")), None)
+        if head == "Score":
+            Console().print(_turned(head, table))
+        else:
+            Console().print(_table(head, in_words(asked_rows, twin) if twin else table))
     typer.echo(f"Written to {out}: diagnosis.json, diagnosis.csv, diagnosis.html")
 
 

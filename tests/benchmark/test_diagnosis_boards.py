@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from defras_bt.benchmark.diagnosis_boards import boards, confusion, is_right
+from defras_bt.benchmark.diagnosis_boards import boards, confusion, in_words, is_right
 from defras_bt.benchmark.diagnosis_cases import CAUSES, BoardCase, board_cases
 from defras_bt.benchmark.diagnosis_runs import BoardRow, board_row
 from defras_bt.cli.main import main
@@ -55,6 +55,19 @@ def test_confusion_is_a_row_for_each_cause() -> None:
     assert table["strain_stiffening"]["(set)"] == 1
     assert table["nothing"]["(outside)"] == 1
     assert table["nothing"]["runs"] == 2
+
+
+def test_in_words_it_is_what_was_said_of_each_cause() -> None:
+    table = {line["hidden"]: line for line in in_words(ROWS, "coupon")}
+    assert table["stress_relaxation"]["said"] == "softening 1"
+    assert table["strain_stiffening"]["said"] == "set of strain_stiffening, softening 1"
+    assert table["nothing"] == {"hidden": "nothing", "runs": 2, "said": "nothing 1; outside 1"}
+
+
+def test_a_cause_without_a_site_is_right_wherever_it_was_named() -> None:
+    assert is_right(row("one", ["joint_play"], "named", ["joint_play@q1"]))
+    assert not is_right(row("one", ["joint_play@q5"], "named", ["joint_play@q6"]))
+    assert not is_right(row("one", ["joint_play"], "named", ["joint_play@q1", "tool_offset"]))
 
 
 def test_baselines_stand_beside_on_the_same_cases() -> None:
