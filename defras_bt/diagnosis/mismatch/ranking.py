@@ -36,13 +36,16 @@ class MismatchRule:
 
     Of the mean distance above the camera's noise ``explained``, of the whole ``relative_gain``,
     where chance would give as much in fewer than ``chance`` of cases; and attachments, fitted to
-    the same points, may not leave less than ``attachments_better`` of what it leaves.
+    the same points, may not leave less than ``attachments_better`` of what it leaves, nor less than
+    it does at all where no more than ``few_holes`` hold otherwise than believed: then they have no
+    more numbers to bend than a rival.
     """
 
     explained: float = 0.6
     relative_gain: float = 0.1
     chance: float = 0.01
     attachments_better: float = 0.85
+    few_holes: int = 3
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,9 @@ class MismatchRanking:
         if best is None:
             return _attachments("nothing else explains it", before_m, shares)
         learned = estimator.estimate(belief, keyframes, rng)
-        limit_m = self.rule.attachments_better * best.after_m
+        changed = int(np.count_nonzero(learned.attached != belief.attached))
+        share = 1.0 if changed <= self.rule.few_holes else self.rule.attachments_better
+        limit_m = share * best.after_m
         if learned.adopted and learned.held_out_after_m < limit_m:
             return _attachments(
                 "attachments explain it better than anything else", before_m, shares
