@@ -11,7 +11,7 @@ ROS_PACKAGES := python3-rospy python3-roslaunch python3-geometry-msgs python3-se
 .PHONY: demo test check setup ros clean
 
 demo: $(READY)
-	$(BIN)/defras run sim/scenes/demo.yaml --actual sim/scenes/demo_actual.yaml --world bullet --seed 1 --out out/demo
+	$(BIN)/defras run sim/scenes/demo.yaml --actual sim/scenes/demo_actual.yaml --world bullet --seed 1 --out out/demo --replace
 
 test: $(READY) ros check
 	$(BIN)/pytest -n 2 --dist worksteal tests
