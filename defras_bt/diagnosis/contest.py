@@ -64,7 +64,6 @@ def accepted_together(
     search.rounds += [Round((trial,), limit / _CLEARLY, trial.key) for trial in trials]
     search.fit, search.noise = fit, after
     search.removed = ()
-    search.history.append(fit)
     return True
 
 
@@ -177,7 +176,6 @@ def accepted_of(
     search.fit = fits[accepted.key]
     if len(now.of_option[accepted.key]) > 1:
         search.fit = _settled(search, accepted.key, after)
-    search.history.append(search.fit)
     search.noise = after
     return True
 

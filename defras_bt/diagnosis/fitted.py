@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from defras_bt.diagnosis.problem import Candidate, Differentiating, Foreseeing, Problem
+from defras_bt.diagnosis.problem import (
+    Approaching,
+    Candidate,
+    Differentiating,
+    Foreseeing,
+    Problem,
+)
 from defras_sim.effects.effect import EffectParameter, Extension
 from defras_sim.geometry import Floats
 
@@ -23,6 +29,7 @@ class CountedProblem:
     def __init__(self, problem: Problem, plain: Extension) -> None:
         self.problem = problem
         self.calls = 0
+        self._plain = plain
         self._known: dict[str, Floats] = {}
         self._derivatives: tuple[str, Mapping[tuple[str, str], Floats]] | None = None
         self.plain = self._predict(plain)
@@ -42,6 +49,17 @@ class CountedProblem:
         new = {_name(model): model for model in models if _name(model) not in self._known}
         if isinstance(self.problem, Foreseeing) and len(new) > 1:
             self.problem.foresee(tuple(new.values()))
+
+    def approach(self, model: Extension) -> bool:
+        """As :meth:`Approaching.approach`; nothing changes where the problem cannot do it."""
+        problem = self.problem
+        if not isinstance(problem, Approaching) or not problem.approach(model):
+            return False
+        # Predicted again for little: what took long was remembered by the twin.
+        calls, self._known, self._derivatives = self.calls, {}, None
+        self.plain = self._predict(self._plain)
+        self.calls = calls
+        return True
 
     def derivatives(
         self, model: Extension, candidates: Sequence[Candidate]

@@ -54,7 +54,6 @@ def fit_plainly(search: Search) -> None:
         fit = _with_fresh_derivatives(search, fit, white)
         search.fit, search.fitted_with = fit, white
         search.noise = estimate_noise(fit.residual, search.samples, search.layout)
-        search.history.append(fit)
         _drop_idle(search, white)
         _take_in_nuisances(search, white)
 
@@ -90,7 +89,6 @@ def _drop_idle(search: Search, white: Noise) -> None:
         then = _excess(search, less)
         if not any(then[s] > (1.0 + search.settings.relative_gain) * now[s] for s in now):
             search.fit = less
-            search.history.append(less)
             search.rounds.append(replace(search.rounds[-1], trials=(), accepted=None, removed=key))
 
 
@@ -133,7 +131,6 @@ def _take_in_nuisances(search: Search, white: Noise) -> None:
             gain = without_it / search.held_out(more, search.noise).total - 1.0
             trial = Trial(candidate.key, more.model, gain, True, more.calls)
             search.fit = more
-            search.history.append(more)
             search.rounds.append(
                 replace(search.rounds[-1], trials=(trial,), accepted=candidate.key)
             )

@@ -168,6 +168,15 @@ class Approximating(Protocol):
         ...
 
 
+@runtime_checkable
+class Approaching(Protocol):
+    """A problem whose twin can be made more accurate near one model."""
+
+    def approach(self, model: Extension) -> bool:
+        """``model`` was accepted; whether residuals of models have changed by that."""
+        ...
+
+
 @dataclass(frozen=True)
 class Covariate:
     """Something that residuals may depend on: ``values`` (n,) for each of the samples, NaN where

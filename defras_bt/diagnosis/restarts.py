@@ -60,7 +60,6 @@ def _begun_anew(search: Search, key: str) -> bool:
         return False
     search.fit = again
     search.noise = estimate_noise(again.residual, search.samples, search.layout)
-    search.history.append(again)
     return True
 
 

@@ -28,7 +28,8 @@ Progress = Callable[[str, float], None]
 class Search:
     """What the selection has found so far; kept up to date, so that an interrupted search can be
     reported. ``fitted_with``: as if the noise were this parameters were fitted in the end, where
-    that predicts better than ``noise``. ``was_cut_short``: before every candidate had its turn."""
+    that predicts better than ``noise``. ``was_cut_short``: before every candidate had its turn.
+    ``approached``: what the twin may be off by has changed since chance was measured last."""
 
     counted: CountedProblem
     samples: Samples
@@ -41,11 +42,11 @@ class Search:
     fitted_with: Noise | None = None
     removed: Chosen = ()
     fits: dict[str, dict[str, Fit]] = field(default_factory=dict)
-    history: list[Fit] = field(default_factory=list)
     rounds: list[Round] = field(default_factory=list)
     ranking: tuple[Ranked, ...] = ()
     pairs: tuple[RankedPair, ...] = ()
     was_cut_short: bool = False
+    approached: bool = False
 
     def accepted(self) -> tuple[str, ...]:
         """Candidates of the present model that are not base."""
@@ -100,7 +101,6 @@ class Search:
         weighing = self.fitted_with or self.noise
         rounds = self.settings.iterations
         self.fit = without(self.counted, self.fit, key, weighing, iterations=rounds)
-        self.history.append(self.fit)
         self.rounds.append(
             Round((), self.rounds[-1].threshold if self.rounds else 0.0, None, removed=key)
         )

@@ -15,7 +15,7 @@ import numpy as np
 from defras_bt.diagnosis.chance import known_noise, maxima
 from defras_bt.diagnosis.contest import accepted_of, accepted_together
 from defras_bt.diagnosis.diagnosis import Round
-from defras_bt.diagnosis.fitting import without
+from defras_bt.diagnosis.fitting import refine, without
 from defras_bt.diagnosis.held_out import Products
 from defras_bt.diagnosis.noise_bias import KnownNoise
 from defras_bt.diagnosis.noise_search import noise_beside
@@ -37,6 +37,7 @@ def select(search: Search, told: Progress) -> None:
         while len(search.accepted()) < search.settings.causes and not search.is_spent:
             if not _forward(search, told):
                 break
+            _approach(search, told)
         if search.is_spent or not restart(search, told):
             break
     search.was_cut_short = search.is_spent
@@ -77,6 +78,16 @@ def _forward(search: Search, told: Progress) -> bool:
     return accepted
 
 
+def _approach(search: Search, told: Progress) -> None:
+    """Have the twin be accurate where the model stands now, and the fit follow it."""
+    told(f"what the twin gets wrong of {', '.join(search.accepted())}", 1.0)
+    if not search.counted.approach(search.fit.model):
+        return
+    search.approached = True
+    fit = replace(search.fit, residual=search.counted.residual(search.fit.model))
+    search.fit = refine(search.counted, fit, search.noise, iterations=search.settings.iterations)
+
+
 def _contested(
     search: Search,
     now: Board,
@@ -99,8 +110,9 @@ def _threshold(
     search: Search, now: Board, known: KnownNoise, left: Floats, largest: float
 ) -> float:
     """What chance reaches. It hardly changes from round to round, so it is measured anew only
-    where the best candidate is anywhere near it."""
-    if search.rounds and largest > _FAR_ABOVE * search.rounds[-1].threshold:
+    where the best candidate is anywhere near it, or the twin is off by something else now."""
+    anew, search.approached = search.approached, False
+    if not anew and search.rounds and largest > _FAR_ABOVE * search.rounds[-1].threshold:
         return search.rounds[-1].threshold
     count = search.settings.surrogates
     chance = maxima(now, known, left, count, search.rng, search.approximations(count))
@@ -125,7 +137,6 @@ def _backward(search: Search, told: Progress) -> None:
             if gain - 1.0 > search.rounds[-1].threshold:
                 continue
             search.fit = less
-            search.history.append(less)
             search.rounds.append(replace(search.rounds[-1], trials=(), accepted=None, removed=key))
             changed = True
             break

@@ -1,17 +1,20 @@
 """Which other causes explain the same: those that could be true and still look this much worse.
 
-For every rival, data are made as it would make them (its fitted prediction and surrogate noise),
-and both are fitted again. If the accepted cause is as far ahead on the measured data as it hardly
-ever is on those, the rival is rejected (Cox 1962, by simulation: Williams 1970).
+For every rival, data are made as it would make them (its fitted prediction, surrogate noise, and
+what the twin itself may be off by), and both are fitted again. If the accepted cause is as far
+ahead on the measured data as it hardly ever is on those, the rival is rejected (Cox 1962, by
+simulation: Williams 1970).
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from defras_bt.diagnosis.confounding import Confounding
 from defras_bt.diagnosis.fitted import Fit, conflicts
-from defras_bt.diagnosis.fitting import Addition, extend, without
+from defras_bt.diagnosis.fitting import Addition, extend, refine, without
 from defras_bt.diagnosis.held_out import losses, products
 from defras_bt.diagnosis.ranking import board, score, start_of, whitened_products
 from defras_bt.diagnosis.search import Progress, Search
@@ -27,8 +30,29 @@ _BEHIND = 0.3
 def rivals(search: Search, key: str, confounding: Confounding, told: Progress) -> dict[str, Fit]:
     """Candidates that cannot be told from the accepted cause ``key`` with this data, with the
     models in which they take its place."""
-    fits = _rival_fits(search, key, confounding, told)
-    return {rival: fit for rival, fit in fits.items() if not _rejected(search, key, rival, fit)}
+    found = {}
+    for rival, fit in _rival_fits(search, key, confounding, told).items():
+        then = search.fits[key][key] if _stood_together(search, key, rival) else None
+        # When both were tried, the twin was equally accurate for both.
+        if then is not None and _rejected(search, key, rival, then, fit):
+            continue
+        nearer = _approached(search, fit)
+        if not _rejected(search, key, rival, search.fit, nearer):
+            found[rival] = nearer
+    return found
+
+
+def _stood_together(search: Search, key: str, rival: str) -> bool:
+    """Whether both were fitted beside the causes of the present model, in the same round."""
+    return search.accepted()[-1] == key and rival in search.fits.get(key, {})
+
+
+def _approached(search: Search, fit: Fit) -> Fit:
+    """``fit`` with the twin as accurate for it as for the accepted model."""
+    if set(fit.model) == set(search.fit.model) or not search.counted.approach(fit.model):
+        return fit
+    fit = replace(fit, residual=search.counted.residual(fit.model))
+    return refine(search.counted, fit, search.noise, iterations=search.settings.iterations)
 
 
 def _rival_fits(
@@ -36,7 +60,6 @@ def _rival_fits(
 ) -> dict[str, Fit]:
     """Models in which a rival takes the place of ``key``."""
     fits = search.fits.get(key, {})
-    last = search.accepted()[-1] == key
     names = list(dict.fromkeys((*fits, *confounding.alike(key, _ALIKE)[:_MOST])))
     mine = search.sketch.candidate(key)
     others = [c for c in search.fit.candidates if c.key != key]
@@ -48,7 +71,7 @@ def _rival_fits(
             continue
         if rival.nuisance and not mine.nuisance:
             continue  # re-tuned along all the time: it did not explain what was named
-        if last and name in fits:
+        if _stood_together(search, key, name):
             found[name] = fits[name]
             continue
         if less is None:
@@ -93,9 +116,9 @@ def _begun_from_ranking(search: Search, less: Fit, name: str, key: str) -> Fit |
     )
 
 
-def _rejected(search: Search, key: str, rival: str, fit: Fit) -> bool:
-    """Whether data made by ``rival`` would hardly ever speak for ``key`` as the measured do."""
-    mine = search.fit
+def _rejected(search: Search, key: str, rival: str, mine: Fit, fit: Fit) -> bool:
+    """Whether data made by ``rival``, with its ``fit``, would hardly ever speak for ``key``, with
+    the fit ``mine``, as the measured do."""
     columns = {
         name: search.tuned_columns(one, key, rival)
         for name, one in (("mine", mine), ("rival", fit))
@@ -119,8 +142,12 @@ def _rejected(search: Search, key: str, rival: str, fit: Fit) -> bool:
     if measured <= 0.0:
         return False
     apart = mine_left - rival_left
-    by_chance = [
-        ahead(drawn + apart, drawn)
-        for drawn in surrogates(noise, mine.residual, search.settings.surrogates, search.rng)
-    ]
+    count, by_chance, begun = search.settings.surrogates, [], 0
+    off = search.approximations(count)
+    for drawn in surrogates(noise, mine.residual, count, search.rng):
+        here = slice(begun, begun + drawn.shape[1])
+        begun = here.stop
+        if off is not None:
+            drawn = drawn + np.where(seen[:, None], off[:, here], 0.0)
+        by_chance.append(ahead(drawn + apart, drawn))
     return measured > float(np.quantile(np.concatenate(by_chance), 1.0 - search.settings.alike))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -40,6 +40,9 @@ class CameraSource(Protocol):
     def now_s(self) -> float:
         """The time on the clock that stamps the messages."""
 
+    def when_unusable(self, act: Callable[[], None]) -> None:
+        """Have ``act`` called, on any thread, as soon as a reading that was sound is no more."""
+
     def close(self) -> None:
         """Listen no more."""
 
@@ -52,6 +55,9 @@ class NoCameras:
 
     def now_s(self) -> float:
         return 0.0
+
+    def when_unusable(self, act: Callable[[], None]) -> None:
+        pass
 
     def close(self) -> None:
         pass

@@ -147,7 +147,7 @@ class Limits(Part):
     state_age_s: Seconds | None = None
     camera_age_s: Seconds = 0.4
     clock_offset_s: Annotated[float, Field(gt=0, le=1)] = 0.02
-    echo_m: Annotated[float, Field(gt=0, le=0.01)] = 0.0005
+    echo_m: Annotated[float, Field(gt=0, le=0.01)] = 0.0001
     echo_rad: Annotated[float, Field(gt=0, le=0.5)] = 0.05
     following_m: Annotated[float, Field(gt=0, le=0.02)] = 0.005
     residual_m: Annotated[float, Field(gt=0, le=0.02)] = 0.002

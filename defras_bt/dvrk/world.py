@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from threading import Event
 from time import monotonic, sleep
 from typing import Any
 
@@ -30,6 +31,9 @@ _READINGS = {"cloud": "cloud", "endoscope": "roi_visibility"}
 
 class DvrkWorld:
     """The robot as it is. Nothing here decides: what is odd is told in words, and left out.
+
+    A picture that cannot be used ends at once what was decided on those before it: a tick is as
+    long as the time in which an arm has to stop. Whether to go on is decided in the next one.
 
     Poses are those of the registration. An arm's set-point is the one that it echoes; where
     commands lead ahead of it is its goal.
@@ -66,6 +70,8 @@ class DvrkWorld:
             for name, arm in setup.arms.items()
         }
         self._lost = ""
+        self._unseen_fault = Event()
+        """A picture became unusable after the latest observation."""
         self._stamps_s: dict[str, float] = {}
         self._report: Mapping[str, Any] | None = None
         snapshot = self._first_snapshot()
@@ -73,6 +79,7 @@ class DvrkWorld:
         begin_s = snapshot.clock_s - 1.0
         self._clock = WorldClock(begin_s, self.tick_s, simulated=simulated_clock)
         self._camera_offset_s = _offset_s(snapshot.clock_s, cameras.now_s())
+        cameras.when_unusable(self._stop_at_once)
         self._latest = self._seen(snapshot)
 
     @property
@@ -101,12 +108,10 @@ class DvrkWorld:
             )
             for name, arm in command.arms.items()
         }
-        try:
-            self._servo.command(Tick(motions, self.tick_s, dict(self._stamps_s)))
-        except ServoLost as lost:
-            # Without its process no arm is driven, which is what a hold asks for; the next
-            # observation says that, and why.
-            self._lost = str(lost)
+        self._drive(Tick(motions, self.tick_s, dict(self._stamps_s)))
+        if self._unseen_fault.is_set():
+            # It came while the command was made; asked afterwards, because it may come now.
+            self._stop()
 
     def step(self) -> None:
         """Wait for the next tick, and look at everything."""
@@ -145,6 +150,21 @@ class DvrkWorld:
             self._lost = str(lost)
         finally:
             self._cameras.close()
+
+    def _stop_at_once(self) -> None:
+        self._unseen_fault.set()
+        self._stop()
+
+    def _stop(self) -> None:
+        self._drive(Tick({}, self.tick_s))
+
+    def _drive(self, tick: Tick) -> None:
+        try:
+            self._servo.command(tick)
+        except ServoLost as lost:
+            # Without its process no arm is driven, which is what a hold asks for; the next
+            # observation says that, and why.
+            self._lost = str(lost)
 
     def _look(self) -> float:
         try:
@@ -220,6 +240,7 @@ class DvrkWorld:
 
     def _cameras_latest(self) -> CameraReadings:
         """The cameras' readings, less those of before the world began."""
+        self._unseen_fault.clear()
         readings = self._cameras.latest()
         cloud, seen_s = readings.cloud, readings.roi_visibility_stamp_s
         if cloud is not None and self._camera_s(cloud.stamp_s) < 0.0:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from defras_bt.learning.adoption import AdoptionRule
+from defras_bt.learning.coarse_search import CELL_M, ROUNDS, coarse_search
 from defras_bt.learning.cost import SearchSettings
 from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
 from defras_bt.learning.hold_out import Split, split
@@ -28,8 +29,8 @@ class InverseEstimator:
 
     search: SearchSettings = field(default_factory=SearchSettings)
     rule: AdoptionRule = field(default_factory=AdoptionRule)
-    search_cell_m: float = 0.02
-    coarse_rounds: int = 8
+    search_cell_m: float = CELL_M
+    coarse_rounds: int = ROUNDS
     fine_rounds: int = 3
     most_fitted: int = 3
     least_travel_m: float = 0.003
@@ -47,32 +48,20 @@ class InverseEstimator:
         if not parts.fitted:
             return kept(belief, "the tissue has not been moved far enough to tell anything")
         try:
-            start = self._search_coarse(belief, keyframes, parts)
+            start = coarse_search(
+                belief, keyframes, parts, self.search, self.search_cell_m, self.coarse_rounds
+            )
             case = Case.of(belief, keyframes, parts)
             found = self._search_fine(belief, case.replay, parts, start)
         except NotRepeatable as fault:
             return kept(belief, f"the observed motion cannot be repeated: {fault}")
         return case.judged(found.attached, found.probability, self.rule, rng)
 
-    def _search_coarse(self, belief: Scene, keyframes: Sequence[Keyframe], parts: Split) -> Mask:
-        """Most of the way, on a mesh on which a round takes a fraction of a second."""
-        tissue = belief.tissue
-        cells = np.array([tissue.length_x_m, tissue.width_y_m]) / self.search_cell_m
-        x, y = (max(2, int(np.ceil(count - 1e-9))) for count in cells)
-        coarse = (x, y, 1) if tissue.element == "hexahedron20" else tissue.elements_xyz
-        replay = Replay(belief, keyframes, coarse)
-        replay.repeat(belief.hole_stiffness_n_per_m(belief.attached))
-        searcher = self._searcher(belief, replay, parts)
-        return searcher.run(belief.attached, self.coarse_rounds).attached
-
     def _search_fine(
         self, belief: Scene, replay: Replay, parts: Split, start: Mask
     ) -> SearchResult:
         """The last steps from the better of ``start`` and the belief, on the scene's own mesh."""
-        searcher = self._searcher(belief, replay, parts)
+        points, frames = parts.fitted_points_m, parts.fitted
+        searcher = AttachmentSearch(belief, replay, points, frames, self.search)
         better = start if searcher.cost(start) < searcher.cost(belief.attached) else belief.attached
         return searcher.run(better, self.fine_rounds)
-
-    def _searcher(self, belief: Scene, replay: Replay, parts: Split) -> AttachmentSearch:
-        points, frames = parts.fitted_points_m, parts.fitted
-        return AttachmentSearch(belief, replay, points, frames, self.search)

@@ -32,12 +32,14 @@ get stuck: letting go one hole of a patch changes next to nothing while its neig
 @dataclass(frozen=True)
 class SearchResult:
     """``attached`` (holes,) is the best set found; ``probability`` (holes,) that each one holds,
-    from what flipping it alone would cost."""
+    from what flipping it alone would cost. ``left_m``: root mean square of what it leaves of the
+    fitted cells, large ones counted as the cost counts them."""
 
     attached: Mask
     probability: Floats
     cost_before: float
     cost_after: float
+    left_m: float
     solves: int
 
 
@@ -89,7 +91,14 @@ class AttachmentSearch:
             self._true_cost(attached, keep=True)
             linearised = self._linearise(attached)
         probability = self._probability(attached, linearised)
-        return SearchResult(attached, probability, before, cost, self._solves)
+        return SearchResult(
+            attached, probability, before, cost, self._left_m(attached, cost), self._solves
+        )
+
+    def _left_m(self, attached: Mask, cost: float) -> float:
+        misfit = cost - float(self._cost.price(attached[None])[0])
+        count = sum(len(cells.points_m) for cells in self._cells)
+        return float(self._settings.error_m * np.sqrt(2.0 * max(misfit, 0.0) / max(count, 1)))
 
     def cost(self, attached: Mask) -> float:
         """What a set costs: misfit and price of departing from the belief."""

@@ -205,6 +205,14 @@ def test_a_second_client_is_found_by_the_echo(driven: DrivenArm) -> None:
     assert driven.arm.held == 1, "a hold ends the other's motion too"
 
 
+def test_a_second_client_that_is_always_pulled_back_is_found(driven: DrivenArm) -> None:
+    """Its goals are overwritten in every period, and refused once they are too far away."""
+    for _ in range(4):
+        driven.arm.setpoint = driven.arm.setpoint.moved(np.array([0.0002, 0.0, 0.0]))
+        driven.period()
+    assert "is commanded by somebody else as well" in driven.drive.snapshot().stopped
+
+
 def test_a_second_client_is_found_before_anything_is_sent() -> None:
     driven = DrivenArm()
     for _ in range(5):

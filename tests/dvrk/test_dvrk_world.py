@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -102,6 +102,7 @@ class ToyCameras:
     def __init__(self, servo: ToyServo) -> None:
         self._servo = servo
         self.readings = CameraReadings()
+        self.act: Callable[[], None] | None = None
         self.ahead_s = 0.0
         self.closed = False
 
@@ -110,6 +111,9 @@ class ToyCameras:
 
     def now_s(self) -> float:
         return self._servo.now_s + self.ahead_s
+
+    def when_unusable(self, act: Callable[[], None]) -> None:
+        self.act = act
 
     def close(self) -> None:
         self.closed = True
@@ -175,6 +179,24 @@ def test_a_jaw_grips_as_far_as_the_set_up_says(
 def test_a_command_that_nobody_can_carry_out(world: DvrkWorld) -> None:
     with pytest.raises(ValueError, match="no arm 'psm3'"):
         world.command(Command({"psm3": ArmCommand()}))
+
+
+def test_a_picture_that_cannot_be_used_stops_what_was_decided_before(
+    world: DvrkWorld, servo: ToyServo, cameras: ToyCameras
+) -> None:
+    moves = Command({"psm1": ArmCommand(np.array([0.01, 0.0, 0.0]))})
+    world.command(moves)
+    assert servo.ticks[-1].moves
+    assert cameras.act is not None
+    cameras.act()
+    assert not servo.ticks[-1].moves
+    # Decided without knowing of it.
+    world.command(moves)
+    assert not servo.ticks[-1].moves
+    # Who has seen it decides.
+    world.step()
+    world.command(moves)
+    assert servo.ticks[-1].moves
 
 
 def test_world_time_is_the_robots_and_goes_on(world: DvrkWorld, servo: ToyServo) -> None:

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from defras_bt.diagnosis.mismatch.finding import MismatchFinding
+from defras_bt.diagnosis.mismatch.ranking import MismatchRanking
 from defras_bt.executive.operation import Operation, operate
 from defras_bt.faults.clouds import Displaced
 from defras_bt.faults.faults import NO_FAULTS, FaultInjection, Faults
@@ -95,3 +97,23 @@ def test_a_bumped_camera_is_registered_anew(believed: Scene, tree_file: Path) ->
     assert heard.last is not None
     assert heard.last.reading is not None
     assert heard.last.reading.mu_m["local"] < np.max(believed.thresholds.delta_m) / 3
+
+
+def test_where_nothing_can_be_told_for_long_attachments_are_learned(
+    believed: Scene, tree_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def cannot_tell(*_: object) -> MismatchFinding:
+        asked.append(True)
+        return MismatchFinding("unclear", "the camera moved, or attachments are others")
+
+    monkeypatch.setattr(MismatchRanking, "explain", cannot_tell)
+    actual = load_scene(resource("sim/scenes/demo_actual.yaml"))
+    # The demo's mismatch grows from 6 to 7 mm at once, which would end the operation.
+    wide = believed.thresholds.model_copy(update={"delta_m": (0.003, 0.005, 0.015)})
+    heard = run(believed.model_copy(update={"thresholds": wide}), actual, tree_file)
+    assert len(asked) >= 2
+    told = [event for event in heard.events if event.kind in ("warning", "learning")]
+    first = next(index for index, event in enumerate(told) if event.kind == "learning")
+    assert "state 2" in told[first - 1].sentence, [event.sentence for event in told]

@@ -78,6 +78,22 @@ def test_a_right_proposal_is_adopted_and_a_wrong_one_refined(
     assert refined.held_out_after_m < 1.2 * right.held_out_after_m
 
 
+def test_where_a_network_leads_astray_the_search_begins_without_it(
+    belief_without_patch: Scene, truth: Scene, record: Record
+) -> None:
+    """It is sure of everything that is wrong, so that no hole of the patch is open to question."""
+    elsewhere = belief_without_patch.attached.copy()
+    elsewhere[-30:-26] ^= True
+    says = Says(np.where(elsewhere, 1.0 - 1e-6, 1e-6))
+    led = ChainEstimator((says,), enough_m=float("inf"))
+    astray = led.estimate(belief_without_patch, record(1), np.random.default_rng(0))
+    found = chain(says, belief_without_patch, record(1))
+    assert found.adopted, found.reason
+    assert not astray.adopted or found.held_out_after_m < astray.held_out_after_m
+    wrong = belief_without_patch.attached != truth.attached
+    assert np.sum(wrong & (found.attached != belief_without_patch.attached)) >= 3
+
+
 def test_without_a_proposal_it_is_the_inverse_estimate(
     belief_without_patch: Scene, record: Record
 ) -> None:

@@ -14,7 +14,7 @@ from defras_bt.diagnosis.quality import DataQuality
 from defras_bt.diagnosis.recording import RecordedRun
 from defras_bt.diagnosis.twins.tissue_approximation import approximation_errors
 from defras_bt.diagnosis.twins.tissue_cells import AssignedCloud
-from defras_bt.diagnosis.twins.tissue_frames import TissueFrames
+from defras_bt.diagnosis.twins.tissue_frames import TissueFrames, before_the_camera
 from defras_bt.diagnosis.twins.tissue_models import LedModels, key_of
 from defras_bt.diagnosis.twins.tissue_part import KeyShapes, TissuePart
 from defras_bt.diagnosis.twins.tissue_planned import Planner
@@ -68,12 +68,12 @@ class TissueProblem:
         )
         self._tangents: tuple[str, TissueTangents] | None = None
         self._residuals: OrderedDict[str, Floats] = OrderedDict()
-        left = self._blocks(plain)
-        corrected = [
-            one - other
-            for one, other in zip(self._blocks(self._models.uncorrected), left, strict=True)
-        ]
+        left, corrected = self._blocks(plain), self._corrections({})
         self.samples = samples_of(self.layout, self.trajectories, plain, left, corrected)
+        self._corrected = _joined(corrected)
+        """By how much less (n,) the model at hand leaves, its mesh's error put right."""
+        self._explained = np.zeros(len(self._corrected))
+        """What (n,) the causes of tissue and arms of the model at hand change."""
 
     def residual(self, model: Extension) -> Floats:
         """Measured minus predicted (n,); see :class:`defras_bt.diagnosis.problem.Problem`."""
@@ -83,7 +83,7 @@ class TissueProblem:
             self._residuals[key] = (
                 np.full(len(self.samples.time_s), np.nan)
                 if frames is None
-                else np.concatenate([block.ravel() for block in self._blocks(frames)])
+                else _joined(self._blocks(frames))
             )
             while len(self._residuals) > _REMEMBERED:
                 self._residuals.popitem(last=False)
@@ -92,6 +92,16 @@ class TissueProblem:
     def foresee(self, models: Sequence[Extension]) -> None:
         """Several residuals will be asked for; see :class:`.problem.Foreseeing`."""
         self._models.foresee([m for m in models if key_of(m) not in self._residuals])
+
+    def approach(self, model: Extension) -> bool:
+        """The mesh's error anew where ``model`` stands; see :class:`.problem.Approaching`."""
+        if not self._models.correct_at(model):
+            return False
+        self._residuals.clear()
+        self._tangents = None
+        self._corrected = _joined(self._corrections(model))
+        self._explained = self.residual({}) - self.residual(before_the_camera(model))
+        return True
 
     def tangents(self, model: Extension, candidate: Candidate) -> Sequence[Tangent]:
         """How predictions change with ``candidate``; what those of all share is found once."""
@@ -125,11 +135,13 @@ class TissueProblem:
         rng: np.random.Generator,
     ) -> Values:
         """Standard error by parameter that the twin's own approximations make."""
-        return systematic_errors(self.samples, residual, candidate, columns, rng)
+        return systematic_errors(
+            self.samples, residual, candidate, columns, self._corrected, self._explained, rng
+        )
 
     def approximations(self, count: int, rng: np.random.Generator) -> Floats:
         """Draws (n, count) of what the twin itself may be off by."""
-        return approximation_errors(self.samples, count, rng)
+        return approximation_errors(self.samples, count, rng, self._explained)
 
     def covariates(self) -> Sequence[Covariate]:
         """How high held tissue is carried, as told."""
@@ -189,12 +201,24 @@ class TissueProblem:
             self.scene, whole, parts, candidates, tolerance, self._jobs, ways, shapes
         )
 
+    def _corrections(self, model: Extension) -> list[Floats]:
+        """By how much less (rows, frames) ``model`` leaves, its mesh's error put right."""
+        bare, whole = self._models.uncorrected(model), self.frames(model)
+        if bare is None or whole is None:
+            return [np.zeros((self.layout.rows, len(t.frames))) for t in self.trajectories]
+        both = zip(self._blocks(bare), self._blocks(whole), strict=True)
+        return [one - other for one, other in both]
+
     def _blocks(self, frames: Sequence[TissueFrames]) -> list[Floats]:
         """Residuals (rows, frames) of every trajectory."""
         return [
             self.layout.residual(each, assigned, its, self.scene.depth_camera)
             for each, assigned, its in zip(self.trajectories, self.assigned, frames, strict=True)
         ]
+
+
+def _joined(blocks: Sequence[Floats]) -> Floats:
+    return np.concatenate([block.ravel() for block in blocks])
 
 
 def _assigned(

@@ -5,12 +5,15 @@ neighbouring patches. So each draw is a smooth field over the tissue that stays 
 errors of a camera that its scatter at rest does not tell), and another one for each phase of the
 motion; forces are off by a share of the largest one. How large errors are follows from the floors
 of the channels, which say how far models of one and the same tissue on different meshes differ:
-they are known before any data.
+they are known before any data. What an accepted cause does is no better known than the twin's mesh
+lets it be: a share of that is wrong too, or else the largest cause would have weaker ones named
+beside it for what the mesh makes of it.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from defras_bt.diagnosis.problem import Samples
 from defras_bt.diagnosis.twins.tissue_phases import PHASES
@@ -18,26 +21,43 @@ from defras_sim.geometry import Floats
 
 SHARE = 0.5
 """Of a channel's floor: standard deviation of what is wrong in it."""
+RELATIVE = 0.03
+"""Of what accepted causes change: standard deviation of what is wrong in it. Two fine meshes,
+hexahedra and tetrahedra of 16 x 16, differ by 3 % in how far gravity moves a folded slab;
+tetrahedra of 10 x 10 by 3 % more."""
 ALIKE_M = 0.02
 """Distance over which the errors of patches are alike."""
 
 
-def approximation_errors(samples: Samples, count: int, rng: np.random.Generator) -> Floats:
-    """Draws (n, count) of the twin's own errors in the numbers that are compared."""
+def approximation_errors(
+    samples: Samples, count: int, rng: np.random.Generator, explained: Floats | None = None
+) -> Floats:
+    """Draws (n, count) of the twin's own errors in the numbers that are compared; ``explained``
+    (n,): what accepted causes change of its predictions, if any are."""
     sd = np.array([SHARE * channel.floor for channel in samples.channels])
-    mixed = sd[:, None] * _field(samples)
+    field = _field(samples)
     found = np.zeros((len(samples.time_s), count))
     rest = PHASES.index("rest")
     for trajectory in np.unique(samples.trajectory):
         mine = samples.trajectory == trajectory
-        lasting = mixed @ rng.standard_normal((len(sd), count))
+        lasting = field @ rng.standard_normal((len(sd), count))
         for phase in np.unique(samples.phase[mine]):
             passing = np.zeros_like(lasting)
             if phase != rest:
-                passing = mixed @ rng.standard_normal((len(sd), count))
+                passing = field @ rng.standard_normal((len(sd), count))
             rows = mine & (samples.phase == phase)
-            found[rows] = ((lasting + passing) / np.sqrt(2.0))[samples.channel[rows]]
+            size = sd if explained is None else np.hypot(sd, _relative(samples, rows, explained))
+            drawn = size[:, None] * (lasting + passing) / np.sqrt(2.0)
+            found[rows] = drawn[samples.channel[rows]]
     return found
+
+
+def _relative(samples: Samples, rows: NDArray[np.bool_], explained: Floats) -> Floats:
+    """By channel (c,), what is wrong in ``explained`` over ``rows``."""
+    squares = np.where(rows & np.isfinite(explained), np.nan_to_num(explained) ** 2, 0.0)
+    count = np.bincount(samples.channel[rows], minlength=len(samples.channels))
+    total = np.bincount(samples.channel, squares, minlength=len(samples.channels))
+    return np.asarray(RELATIVE * np.sqrt(total / np.maximum(count, 1)))
 
 
 def _field(samples: Samples) -> Floats:

@@ -1,8 +1,9 @@
 """What the twin's mesh gets wrong, known before anything is blamed on the patient.
 
 A mesh fast enough to run beside an operation misses a folded surface by up to a millimetre. That
-error hardly changes with the causes that are looked for, so it is computed once, for the plain
-model on a finer mesh, and put right in every prediction.
+error hardly changes with small causes, so it is computed for the plain model on a finer mesh, and
+put right in every prediction. With large ones it does: it is computed anew for each model that is
+accepted, or else weaker causes would be named beside for what it has changed.
 """
 
 from __future__ import annotations

@@ -37,8 +37,8 @@ class LedModels:
     tissue is seen only, by camera and clock, are led along once.
 
     ``plain``: frames of every trajectory as the plain model has them, the error of its mesh put
-    right; ``uncorrected``: as it is. ``shapes``: its keyframes,
-    with what ``effects`` would change there; none without effects.
+    right. ``shapes``: its keyframes, with what ``effects`` would change there; none without
+    effects.
 
     Raises:
         UnusableRecording: the plain model cannot follow a trajectory at all.
@@ -53,32 +53,65 @@ class LedModels:
     ) -> None:
         self._scene, self._trajectories, self._jobs = scene, tuple(trajectories), jobs
         self._led: OrderedDict[str, tuple[Prediction, ...] | None] = OrderedDict()
-        plain, self._corrections, self.shapes = self._begin(effects)
-        self.uncorrected = tuple(plain)
-        self.plain = tuple(
-            correction.applied(each)
-            for correction, each in zip(self._corrections, plain, strict=True)
-        )
+        plain, corrections, self.shapes = self._begin(effects)
+        self._corrections = {self._effects_of({}): corrections}
+        """By the effects of the model that they were computed for."""
+        self.plain = _applied(corrections, plain)
 
     def whole(self, model: Extension) -> dict[str, Values]:
         """``model`` with the effects that the scene itself adopts, or in their place."""
         return {**self._scene.model.extension, **model}
 
     def frames(self, model: Extension) -> tuple[TissueFrames, ...] | None:
-        """What ``model`` says of the frames of every trajectory; None where it cannot."""
+        """What ``model`` says of the frames of every trajectory, the error of its mesh put right;
+        None where it cannot."""
+        found = self.uncorrected(model)
+        return None if found is None else _applied(self._corrections_for(model), found)
+
+    def uncorrected(self, model: Extension) -> tuple[TissueFrames, ...] | None:
+        """As :meth:`frames`, with the error of the mesh."""
+        predictions = self._led_along(model)
+        if predictions is None:
+            return None
+        whole, both = self.whole(model), zip(predictions, self._trajectories, strict=True)
+        return tuple(frames_of(one, self._scene, whole, each) for one, each in both)
+
+    def correct_at(self, model: Extension) -> bool:
+        """Compute the mesh's error anew for ``model``, and put it right so in every model that has
+        at least its effects; whether there is anything new. Where the finer mesh cannot follow,
+        the error stays that of a model with fewer effects."""
+        fine, whole = finer(self._scene), self.whole(model)
+        self.foresee([model])
+        predicted = self._led_along(model)
+        if fine is None or predicted is None or self._key(model) == self._key({}):
+            return False
+        ways = zip(self._trajectories, self.ways(model), strict=True)
+        refined = Parallel(n_jobs=self._jobs, inner_max_num_threads=1)(
+            delayed(led_along)(fine, whole, each, _sparse(each), finer_way(way, self._scene, fine))
+            for each, way in ways
+        )
+        if any(other is None for other in refined):
+            return False
+        self._corrections[self._effects_of(model)] = tuple(
+            self._correction(model, one, other, each)
+            for one, other, each in zip(predicted, refined, self._trajectories, strict=True)
+        )
+        return True
+
+    def _effects_of(self, model: Extension) -> frozenset[str]:
+        return frozenset(before_the_camera(self.whole(model)))
+
+    def _corrections_for(self, model: Extension) -> tuple[MeshCorrection, ...]:
+        """Those of the largest part of ``model`` for which the error was computed."""
+        names = self._effects_of(model)
+        return self._corrections[max((k for k in self._corrections if k <= names), key=len)]
+
+    def _led_along(self, model: Extension) -> tuple[Prediction, ...] | None:
         key = self._key(model)
         if key not in self._led:
             self._lead_along({key: model})
         self._led.move_to_end(key)
-        predictions = self._led[key]
-        if predictions is None:
-            return None
-        return tuple(
-            correction.applied(frames_of(prediction, self._scene, self.whole(model), each))
-            for each, correction, prediction in zip(
-                self._trajectories, self._corrections, predictions, strict=True
-            )
-        )
+        return self._led[key]
 
     def ways(self, model: Extension) -> tuple[KnownWay | None, ...]:
         """Where the nodes of ``model``, or of the one led along last, went in every trajectory."""
@@ -165,21 +198,31 @@ class LedModels:
         found = Parallel(n_jobs=self._jobs, inner_max_num_threads=1)([*refined, *jobs])
         others = found[: len(refined)] or [None] * len(self._trajectories)
         corrections = tuple(
-            self._correction(one, other, each)
+            self._correction({}, one, other, each)
             for one, other, each in zip(predicted, others, self._trajectories, strict=True)
         )
         return plain, corrections, key_shapes(found[len(refined) :], len(self._trajectories))
 
     def _correction(
-        self, coarse: Prediction, fine: Prediction | None, trajectory: Trajectory
+        self,
+        model: Extension,
+        coarse: Prediction,
+        fine: Prediction | None,
+        trajectory: Trajectory,
     ) -> MeshCorrection:
         """Of the same instants on both meshes, whatever delay the camera has."""
-        model = before_the_camera(self.whole({}))
-        one = frames_of(coarse, self._scene, model, trajectory)
+        unseen = before_the_camera(self.whole(model))
+        one = frames_of(coarse, self._scene, unseen, trajectory)
         if fine is None:
             return MeshCorrection.none(one)
-        other = frames_of(fine, self._scene, model, trajectory)
+        other = frames_of(fine, self._scene, unseen, trajectory)
         return MeshCorrection.between(one, other, keyframes(trajectory))
+
+
+def _applied(
+    corrections: Sequence[MeshCorrection], frames: Sequence[TissueFrames]
+) -> tuple[TissueFrames, ...]:
+    return tuple(c.applied(each) for c, each in zip(corrections, frames, strict=True))
 
 
 def _followed(

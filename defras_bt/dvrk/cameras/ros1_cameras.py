@@ -54,6 +54,7 @@ class Ros1Cameras:
         self._lock = Lock()
         self._readings = CameraReadings()
         self._faults: dict[str, str] = {}
+        self._act: Callable[[], None] = lambda: None
         self._last_s: dict[str, float] = {}
         self._parts: dict[str, Any] = {}
         """Latest depth, colour and info messages, until they make a cloud together."""
@@ -75,6 +76,10 @@ class Ros1Cameras:
     def now_s(self) -> float:
         """ROS time."""
         return float(self._rospy.get_time())
+
+    def when_unusable(self, act: Callable[[], None]) -> None:
+        """Have ``act`` called, on rospy's threads, as soon as a sound reading is no more."""
+        self._act = act
 
     def close(self) -> None:
         """Listen no more."""
@@ -190,4 +195,7 @@ class Ros1Cameras:
 
     def _fault(self, name: str, fault: Unusable) -> None:
         with self._lock:
+            is_new = name not in self._faults
             self._faults[name] = f"the {name} cannot be used: {fault}"
+        if is_new:
+            self._act()

@@ -11,6 +11,7 @@ import subprocess
 import sys
 from multiprocessing import Pipe
 from pathlib import Path
+from threading import Lock
 from time import monotonic
 from typing import Any
 
@@ -30,7 +31,7 @@ class ServoLost(RuntimeError):
 
 
 class ServoProcess:
-    """As :class:`ServoLoop`, in a process of its own."""
+    """As :class:`ServoLoop`, in a process of its own. Any thread may command; one asks."""
 
     def __init__(self, setup: Setup, log_file: Path | None = None) -> None:
         """
@@ -38,6 +39,7 @@ class ServoProcess:
             ConnectionFailed: the process cannot connect; the message says why.
         """
         self._pipe, theirs = Pipe()
+        self._sending = Lock()
         # Not by multiprocessing, which would load the main program once more; in a session of its
         # own, because Ctrl-C is for the executive, which stops the arms in order.
         self._process = subprocess.Popen(
@@ -112,7 +114,8 @@ class ServoProcess:
 
     def _send(self, what: Begin | Tick | Request) -> None:
         try:
-            self._pipe.send(what)
+            with self._sending:
+                self._pipe.send(what)
         except OSError as error:
             raise self._ended() from error
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from defras_bt.learning.adoption import AdoptionRule
 from defras_bt.learning.chain.candidates import candidate_sets, open_questions
+from defras_bt.learning.coarse_search import coarse_search
 from defras_bt.learning.cost import SearchSettings
 from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
 from defras_bt.learning.hold_out import split
@@ -17,7 +18,7 @@ from defras_bt.learning.judging import Case, kept
 from defras_bt.learning.networks.propose import Proposal, Proposer
 from defras_bt.learning.prediction import Predicted
 from defras_bt.learning.replay import NotRepeatable
-from defras_bt.learning.search import AttachmentSearch, SearchResult
+from defras_bt.learning.search import AttachmentSearch, Mask, SearchResult
 from defras_sim.scene import Scene
 
 
@@ -29,6 +30,8 @@ class ChainEstimator:
     ``proposers`` are asked in turn. ``sure``: a hole is changed in a proposal where its network
     says with such a probability that it is otherwise than believed. The search changes at most
     ``most_holes`` holes, of those to which a network gives a chance of ``least_doubt`` or more.
+    Where it leaves more than ``enough_m`` of the fitted points the networks were wrong, and the
+    search begins again without them.
     """
 
     proposers: tuple[Proposer, ...]
@@ -40,6 +43,7 @@ class ChainEstimator:
     rounds: int = 4
     most_fitted: int = 3
     least_travel_m: float = 0.003
+    enough_m: float = 0.0002
 
     def estimate(
         self, belief: Scene, keyframes: Sequence[Keyframe], rng: np.random.Generator
@@ -66,20 +70,29 @@ class ChainEstimator:
 
     def _refined(self, case: Case, proposals: Sequence[Proposal]) -> SearchResult:
         """The inverse estimate from the set that explains the fitted points best."""
+        found = self._searched(case, proposals)
+        if not proposals or found.left_m <= self.enough_m:
+            return found
+        try:
+            start = coarse_search(case.belief, case.keyframes, case.parts, self.search)
+            again = self._searcher(case).run(start, self.rounds)
+        except NotRepeatable:
+            # Only the other beginning is lost; whether the first one's end is believed is judged.
+            return found
+        return again if again.cost_after < found.cost_after else found
+
+    def _searched(self, case: Case, proposals: Sequence[Proposal]) -> SearchResult:
         belief = case.belief
         sets = candidate_sets(belief, proposals, self.sure)
         asked = open_questions(belief, proposals, sets, self.most_holes, self.least_doubt)
-        searcher = AttachmentSearch(
-            belief,
-            case.replay,
-            case.parts.fitted_points_m,
-            case.parts.fitted,
-            self.search,
-            considered=asked if proposals else None,
-        )
+        searcher = self._searcher(case, asked if proposals else None)
         best, lowest = belief.attached, searcher.cost(belief.attached)
         for each in sets:
             cost = searcher.cost(each)
             if cost < lowest:
                 best, lowest = each, cost
         return searcher.run(best, self.rounds)
+
+    def _searcher(self, case: Case, considered: Mask | None = None) -> AttachmentSearch:
+        points_m, frames = case.parts.fitted_points_m, case.parts.fitted
+        return AttachmentSearch(case.belief, case.replay, points_m, frames, self.search, considered)

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from defras_bt.diagnosis.problem import Channel, Samples
-from defras_bt.diagnosis.twins.tissue_approximation import ALIKE_M, SHARE, approximation_errors
+from defras_bt.diagnosis.twins.tissue_approximation import (
+    ALIKE_M,
+    RELATIVE,
+    SHARE,
+    approximation_errors,
+)
 from defras_bt.diagnosis.twins.tissue_phases import PHASES
 
 PLACES_M = ((0.0, 0.0), (ALIKE_M, 0.0), (0.1, 0.0))
@@ -55,3 +60,16 @@ def test_neighbours_are_off_alike() -> None:
     assert alike[0, 1] == pytest.approx(np.exp(-0.5), abs=0.05)
     for other in (2, 3, 4):
         assert abs(alike[0, other]) < 0.06
+
+
+def test_what_is_explained_is_wrong_by_a_share_where_it_shows() -> None:
+    explained = np.zeros((len(CHANNELS), len(FRAMES)))
+    explained[0, 5:10] = explained[0, 15:] = 0.02
+    explained[2] = np.nan
+    rng = np.random.default_rng(4)
+    drawn = approximation_errors(samples(), 4000, rng, explained.ravel())
+    sd = drawn.reshape(len(CHANNELS), len(FRAMES), -1).std(axis=2)
+    known = SHARE * CHANNELS[0].floor
+    assert sd[0, 5] == pytest.approx(np.hypot(known, RELATIVE * 0.02), rel=0.05)
+    assert sd[0, 10] == pytest.approx(known, rel=0.05)
+    assert sd[2, 5] == pytest.approx(SHARE * CHANNELS[2].floor, rel=0.05)

@@ -123,11 +123,14 @@ def test_arms_cameras_and_faults_as_a_client_meets_them(ros_master, start_stand_
     servo.publish(setpoint.wait())
     assert "PAUSED" in error.wait(since=refusals).string
     state.wait(lambda m: m.state == "ENABLED", since=state.heard.index(paused))
+    told_at_once: list[float] = []
+    cameras.when_unusable(lambda: told_at_once.append(monotonic()))
     faults.publish("{fault: millimetres}")
     since_s = monotonic()
     while "millimetres" not in cameras.latest().faults.get("cloud", ""):
         assert monotonic() - since_s < 10.0
         sleep(0.05)
+    assert len(told_at_once) == 1
     cameras.close()
 
     assert running.end() == 0
