@@ -16,6 +16,8 @@ from defras_sim.effects.effect import TwinName
 
 TWINS: tuple[TwinName, ...] = ("arm", "coupon", "tissue")
 _OTHER = ("set", "outside", "nothing")
+_STRONG = 2.0
+"""Times the detection limit."""
 
 
 def boards(rows: Sequence[BoardRow]) -> dict[str, list[dict[str, Any]]]:
@@ -41,6 +43,7 @@ def _score(rows: Sequence[BoardRow], twin: TwinName) -> dict[str, Any]:
     return {
         "twin": twin,
         "named right (macro)": _macro(one),
+        "from twice the limit on (macro)": _macro([row for row in one if _is_strong(row)]),
         "right or in the set": _share([is_right(row) or _in_set(row) for row in one]),
         "false alarm": _share([row.verdict != "nothing" for row in nothing]),
         "lacking: outside": _share([row.verdict == "outside" for row in lacking]),
@@ -140,6 +143,11 @@ def _beside(rows: Sequence[BoardRow]) -> list[dict[str, Any]]:
     return table
 
 
+def _is_strong(row: BoardRow) -> bool:
+    """Whether what was hidden is at least twice as strong as what can just be told from chance."""
+    return row.times_limit is not None and row.times_limit >= _STRONG
+
+
 def _macro(rows: Sequence[BoardRow]) -> str:
     """Mean over causes of the share named right, with the runs."""
     causes = sorted({row.causes[0] for row in rows})
@@ -178,6 +186,7 @@ def _case(row: BoardRow) -> dict[str, Any]:
         "named": ", ".join(row.named),
         "set": ", ".join(row.alike),
         "right": is_right(row),
+        "times the limit": row.times_limit,
         "in range": row.in_range,
         "beyond range": row.beyond_range,
         "new grasp": row.new_grasp,

@@ -19,6 +19,7 @@ from defras_bt.benchmark.hidden_noise import NoiseSpectrum
 from defras_bt.benchmark.hidden_recording import reality, record
 from defras_bt.benchmark.hidden_tables import arm_table, coupon_table
 from defras_bt.diagnosis.baselines import BASELINES, baseline
+from defras_bt.diagnosis.diagnosis import Ranked
 from defras_bt.diagnosis.engine import diagnose
 from defras_bt.diagnosis.problem import Candidate, Problem, Samples, Tangent
 from defras_bt.diagnosis.recording_reader import read_recording
@@ -40,7 +41,8 @@ class BoardRow:
 
     ``named`` are keys; ``alike`` are all that the verdict's set holds. ``covered``: for each
     strength whose effect was named rightly, whether the 90 % interval holds the truth.
-    ``baselines``: by name, (alarm, named).
+    ``baselines``: by name, (alarm, named). ``times_limit``: how far above the detection limit what
+    was hidden stands; see :func:`times_limit`.
     """
 
     key: str
@@ -58,6 +60,7 @@ class BoardRow:
     wall_s: float
     baselines: dict[str, list[Any]] = field(default_factory=dict)
     error: str = ""
+    times_limit: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -151,6 +154,7 @@ def _asked(case: BoardCase, *, further: bool, baselines: bool) -> BoardRow:
                 others[name] = [bool(said.alarm), said.named]
     verdict = told.verdict
     gain = verdict.gain
+    chance = told.rounds[0].threshold if told.rounds else 0.0
     return BoardRow(
         case.key,
         case.board,
@@ -166,7 +170,26 @@ def _asked(case: BoardCase, *, further: bool, baselines: bool) -> BoardRow:
         verdict.unexplained_share,
         round(wall_s, 2),
         others,
+        times_limit=times_limit(told.ranking, chance, case.causes),
     )
+
+
+def times_limit(ranking: Sequence[Ranked], chance: float, causes: Sequence[str]) -> float | None:
+    """How many times stronger the weakest of what was hidden is than what would just be told from
+    chance; None where nothing was.
+
+    What a cause explains of held-out data beside the plain model grows with the square of its
+    strength; at the limit it is what ``chance`` reaches.
+    """
+    if not causes or chance <= 0.0:
+        return None
+
+    def explains(cause: str) -> float:
+        known = [r.held_out for r in ranking if cause in (r.key, r.key.split("@")[0])]
+        return max(known, default=0.0)
+
+    weakest = max(min(explains(cause) for cause in causes), 0.0)
+    return round(float(np.sqrt(weakest / chance)), 2)
 
 
 def _made(case: BoardCase, folder: Path, *, further: bool) -> _Material:

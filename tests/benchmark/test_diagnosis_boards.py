@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from defras_bt.benchmark.diagnosis_boards import boards, confusion, in_words, is_right
 from defras_bt.benchmark.diagnosis_cases import CAUSES, BoardCase, board_cases
-from defras_bt.benchmark.diagnosis_runs import BoardRow, board_row
+from defras_bt.benchmark.diagnosis_runs import BoardRow, board_row, times_limit
 from defras_bt.cli.main import main
+from defras_bt.diagnosis.diagnosis import Ranked
 from defras_sim.effects.effect import TwinName
 from defras_sim.effects.library import effect
 
@@ -47,6 +49,29 @@ def test_scores_count_each_board_by_itself() -> None:
     assert score["false alarm"].startswith("50% (")
     assert score["lacking: outside"].startswith("100% (")
     assert score["two: both named or a set"].endswith("of 1")
+
+
+def test_what_can_hardly_be_told_from_chance_is_scored_apart() -> None:
+    strong = [replace(ROWS[0], times_limit=2.0), replace(ROWS[1], times_limit=1.9), ROWS[2]]
+    (score,) = boards(strong)["Score"]
+    assert score["named right (macro)"] == "33% of 3"
+    assert score["from twice the limit on (macro)"] == "100% of 1"
+
+
+def test_a_cause_is_as_strong_as_the_root_of_what_it_explains_beyond_chance() -> None:
+    ranking = (
+        Ranked("softening", 0.5, 0.8, True, {}),
+        Ranked("lag@q1", 0.1, 0.05, True, {}),
+        Ranked("lag@q2", 0.1, 0.2, True, {}),
+        Ranked("play", 0.0, -0.1, True, {}),
+    )
+    assert times_limit(ranking, 0.05, ("softening",)) == 4.0
+    assert times_limit(ranking, 0.05, ("lag",)) == 2.0
+    assert times_limit(ranking, 0.05, ("lag@q1",)) == 1.0
+    assert times_limit(ranking, 0.05, ("softening", "lag")) == 2.0
+    assert times_limit(ranking, 0.05, ("play",)) == 0.0
+    assert times_limit(ranking, 0.05, ("unknown",)) == 0.0
+    assert times_limit(ranking, 0.05, ()) is None
 
 
 def test_confusion_is_a_row_for_each_cause() -> None:
@@ -92,11 +117,14 @@ def test_a_hidden_law_of_a_specimen_is_found_and_outside_where_it_is_lacking() -
     )
     assert found.named == ["stress_relaxation"]
     assert found.covered
+    assert found.times_limit is not None
+    assert found.times_limit > 2.0
     lacking = board_row(
         BoardCase("lacking", "coupon", ("stress_relaxation",), 500), further=False, baselines=False
     )
     assert lacking.verdict == "outside"
     assert lacking.named == []
+    assert lacking.times_limit is None or lacking.times_limit == 0.0
 
 
 def test_the_command_leaves_its_boards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
