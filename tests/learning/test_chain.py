@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from defras_bt.learning.chain.chain import ChainEstimator
+from defras_bt.learning.chain.chain import ChainEstimator, pooled
 from defras_bt.learning.chain.estimators import ESTIMATORS, estimator
 from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
 from defras_bt.learning.networks.estimator import NetworkEstimator
@@ -92,6 +92,17 @@ def test_where_a_network_leads_astray_the_search_begins_without_it(
     assert not astray.adopted or found.held_out_after_m < astray.held_out_after_m
     wrong = belief_without_patch.attached != truth.attached
     assert np.sum(wrong & (found.attached != belief_without_patch.attached)) >= 3
+
+
+def test_opinions_are_pooled_by_their_odds() -> None:
+    odds = np.array([[1.0, 9.0, 4.0, 1e9], [4.0, 1.0, 4.0, 1e9]])
+    is_hole = np.array([True, True, False, True])
+    found = pooled(odds / (1.0 + odds), is_hole)
+    assert found[:2] == pytest.approx([2.0 / 3.0, 3.0 / 4.0])
+    assert found[2] == 0.0
+    assert found[3] < 1.0
+    alone = np.array([0.3, 0.7, 0.0, 0.5])
+    assert pooled([alone], is_hole) == pytest.approx(alone)
 
 
 def test_without_a_proposal_it_is_the_inverse_estimate(

@@ -19,7 +19,11 @@ from defras_bt.learning.networks.propose import Proposal, Proposer
 from defras_bt.learning.prediction import Predicted
 from defras_bt.learning.replay import NotRepeatable
 from defras_bt.learning.search import AttachmentSearch, Mask, SearchResult
+from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
+
+_SUREST = 1e-4
+"""Nearer to certainty no opinion counts."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,8 @@ class ChainEstimator:
             found = self._refined(case, proposals)
         except NotRepeatable as fault:
             return kept(belief, f"the observed motion cannot be repeated: {fault}")
-        probability = proposals[0].probability if proposals else found.probability
+        said = [proposal.probability for proposal in proposals[:1]]
+        probability = pooled([*said, found.probability], belief.is_hole)
         return case.judged(found.attached, probability, self.rule, rng)
 
     def _proposals(self, case: Case) -> list[Proposal]:
@@ -96,3 +101,15 @@ class ChainEstimator:
     def _searcher(self, case: Case, considered: Mask | None = None) -> AttachmentSearch:
         points_m, frames = case.parts.fitted_points_m, case.parts.fitted
         return AttachmentSearch(case.belief, case.replay, points_m, frames, self.search, considered)
+
+
+def pooled(opinions: Sequence[Floats], is_hole: Mask) -> Floats:
+    """Probability (holes,) out of several ``opinions`` (holes,), 0 where there is no hole: the mean
+    of their log odds (logarithmic opinion pool, Genest and Zidek 1986).
+
+    A network is too sure where it has seen little, and a search not sure enough where points say
+    nothing. They judge the same points, so their evidence must not be added.
+    """
+    kept = np.clip(np.array(opinions), _SUREST, 1.0 - _SUREST)
+    log_odds = np.mean(np.log(kept / (1.0 - kept)), axis=0)
+    return np.where(is_hole, 1.0 / (1.0 + np.exp(-log_odds)), 0.0)
