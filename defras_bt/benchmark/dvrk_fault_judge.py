@@ -62,13 +62,15 @@ def read_facts(witness: Path) -> list[Fact]:
 
 
 def moving(facts: Sequence[Fact]) -> list[float]:
-    """Times of the set-points that led an arm elsewhere than the one before."""
+    """Times of the set-points that led an arm elsewhere than the one before; not of those that the
+    stand-in's own second client sent."""
     return [
         fact["time_s"]
         for fact in facts
         if fact["event"] == "goal"
         and str(fact["command"]).startswith(("servo_", "move_"))
         and "refused" not in fact
+        and "by" not in fact
         and fact["way_m"] > MOVED_M
     ]
 
@@ -99,6 +101,11 @@ def first_picture_s(pictures: Sequence[Fact], kind: str) -> float:
     """When the first picture with the fault ``kind`` left the camera; infinite without one."""
     wrong = (fact["time_s"] for fact in pictures if kind in fact["faults"])
     return min(wrong, default=float("inf"))
+
+
+def first_foreign_s(facts: Sequence[Fact]) -> float:
+    """When the second client's first goal came, obeyed or not; infinite without one."""
+    return min((fact["time_s"] for fact in facts if "by" in fact), default=float("inf"))
 
 
 def grips(facts: Sequence[Fact], from_s: float, until_s: float) -> tuple[bool, bool]:

@@ -17,6 +17,7 @@ from defras_bt.benchmark.dvrk_fault_judge import (
     DvrkVerdict,
     Fact,
     fault_times,
+    first_foreign_s,
     first_picture_s,
     grips,
     last_motion_s,
@@ -234,14 +235,18 @@ def _judged(
     if fault.kind in ("millimetres", "wrong_frame", "frozen") and after_s is not None:
         pictures = read_facts(cameras_witness(folder / _WITNESS) or folder)
         known_s = first_picture_s(pictures, fault.kind) + after_s
+    if fault.kind == "second_client" and after_s is not None:
+        known_s = first_foreign_s(facts) + after_s
     times_s = moving(facts)
     last_s = last_motion_s(times_s, begun_s)
     late_s = 0.0
-    if known_s is not None:
+    if known_s is not None and known_s < float("inf"):
         late_s = max(0.0, (last_motion_s(times_s, known_s) or known_s) - known_s)
     broke = ended.broke
     if not broke and begun_s == float("inf"):
         broke = f"the run ended before the fault came ({ended.reason})"
+    elif not broke and known_s == float("inf"):
+        broke = "the fault was ordered, and never showed"
     held, let_go = grips(facts, begun_s, begun_s + LASTS_S)
     needed = {RECORDING: ended.duration_s, NUMBERS: ended.duration_s}
     return DvrkVerdict(

@@ -213,6 +213,15 @@ def test_a_second_client_that_is_always_pulled_back_is_found(driven: DrivenArm) 
     assert "is commanded by somebody else as well" in driven.drive.snapshot().stopped
 
 
+def test_a_second_client_that_is_overheard_stops_motion_at_once(driven: DrivenArm) -> None:
+    driven.transport.intruder = "/teleoperation commands it as well (servo_cp)"
+    ends(driven)
+    assert "/teleoperation" in driven.drive.snapshot().stopped
+    driven.transport.intruder = ""
+    driven.go(2)
+    assert driven.drive.snapshot().stopped == ""
+
+
 def test_a_second_client_is_found_before_anything_is_sent() -> None:
     driven = DrivenArm()
     for _ in range(5):

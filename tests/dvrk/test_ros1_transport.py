@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Iterator
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
@@ -109,8 +111,48 @@ def test_commands_reach_whoever_listens(wire: Wire) -> None:
 
 def test_who_else_commands(wire: Wire, ros_master: RosMaster) -> None:
     assert wire.transport.commanders("PSM9") == (), "not counting ourselves"
+    assert wire.transport.overheard("PSM9") == "", "not counting ourselves"
     assert not node_lives(ros_master.uri, "/nobody")
     assert node_lives(ros_master.uri, wire.rospy.get_name())
+
+
+_STRANGER = """
+import sys
+from time import sleep
+from defras_bt.dvrk.ros_packages import ros_module
+from defras_bt.dvrk.settings import Ros1Transport
+from defras_bt.dvrk.transport.ros1_node import join
+rospy = join(Ros1Transport(master_uri=sys.argv[1], own_address="127.0.0.1"), "forgotten")
+joints = ros_module("sensor_msgs.msg").JointState
+out = rospy.Publisher("/PSM9/move_jr", joints, queue_size=1)
+while True:
+    out.publish(joints(position=[0.0] * 6))
+    sleep(0.02)
+"""
+
+
+def test_a_stranger_who_commands_is_overheard_until_it_ends(
+    wire: Wire, ros_master: RosMaster
+) -> None:
+    wire.transport.announce("PSM9")
+    stranger = subprocess.Popen([sys.executable, "-c", _STRANGER, ros_master.uri])
+    try:
+        _until(lambda: bool(wire.transport.overheard("PSM9")))
+        who = wire.transport.overheard("PSM9")
+        assert who.startswith("/forgotten")
+        assert who.endswith("commands it as well (move_jr)")
+        assert wire.transport.overheard("PSM8") == ""
+    finally:
+        stranger.kill()
+        stranger.wait()
+    _until(lambda: not wire.transport.overheard("PSM9"))
+
+
+def _until(true: Callable[[], bool]) -> None:
+    until_s = monotonic() + 20.0
+    while not true():
+        assert monotonic() < until_s
+        sleep(0.01)
 
 
 @pytest.mark.parametrize(

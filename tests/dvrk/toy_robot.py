@@ -92,6 +92,7 @@ class ToyTransport:
         self.jaws: list[tuple[float, str, float]] = []
         self.gone = ""
         self.others: tuple[str, ...] | None = ()
+        self.intruder = ""
         self.closed = False
 
     def listen(self, arm: str, topic: str, receive: Callable[[Any], object]) -> None:
@@ -120,6 +121,9 @@ class ToyTransport:
 
     def commanders(self, arm: str) -> tuple[str, ...] | None:
         return self.others
+
+    def overheard(self, arm: str) -> str:
+        return self.intruder
 
     def close(self) -> None:
         self.closed = True

@@ -111,6 +111,10 @@ class CrtkArm:
         """End any motion, whoever commands it."""
         self._transport.hold(self.name)
 
+    def overheard(self) -> str:
+        """Who else has just commanded the arm, in words; "" where nobody is known to have."""
+        return self._transport.overheard(self.name)
+
     def faults(self) -> tuple[str, ...]:
         """What is wrong with messages that still come, one sentence a topic."""
         heard = (

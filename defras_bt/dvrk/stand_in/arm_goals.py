@@ -13,8 +13,8 @@ from defras_bt.dvrk.stand_in.refusal import Refused
 from defras_bt.dvrk.stand_in.ros_messages import pose_of, twist_of
 from defras_bt.dvrk.transport.crtk_messages import crtk_messages
 
-Heed = Callable[[str, Callable[[], None]], None]
-"""Carries out a command of that name; called on rospy's threads."""
+Heed = Callable[[str, Callable[[], None], str], None]
+"""Carries out a command of that name, sent by that node; called on rospy's threads."""
 
 
 def listen(rospy: Any, arm: Psm, name: str, heed: Heed) -> list[Any]:
@@ -38,7 +38,12 @@ def listen(rospy: Any, arm: Psm, name: str, heed: Heed) -> list[Any]:
     }
 
     def heeding(command: str, act: Callable[[Any], None]) -> Callable[[Any], None]:
-        return lambda message: heed(command, lambda: act(message))
+        def hear(message: Any) -> None:
+            # rospy tells the sender of a message nowhere else.
+            node = message._connection_header["callerid"]
+            heed(command, lambda: act(message), node)
+
+        return hear
 
     return [
         rospy.Subscriber(f"/{name}/{command}", kind, heeding(command, act), tcp_nodelay=True)

@@ -17,6 +17,7 @@ from defras_bt.dvrk.stand_in.pacing import Pace
 from defras_bt.dvrk.stand_in.patient import ArmFeedback, TipTarget
 from defras_bt.dvrk.stand_in.psm import Psm, PsmReading
 from defras_bt.dvrk.stand_in.refusal import Refused
+from defras_bt.dvrk.stand_in.second_commander import SecondCommander
 from defras_bt.dvrk.stand_in.witness import Witness
 from defras_sim.geometry import Floats, Pose
 from defras_sim.scene import ArmName
@@ -51,15 +52,15 @@ class ArmStation:
         self._topics = ArmTopics(rospy, name, delivery)
         self._felt: ArmFeedback | None = None
         self._goal: Pose | None = None
-        self._other: tuple[Floats, float] | None = None
-        """Where a second client began, and how fast it goes."""
+        self._rospy = rospy
+        self._other: SecondCommander | None = None
         self._listening = listen(rospy, arm, name.upper(), self._heed)
 
     def advance(self, time_s: float) -> None:
         """Let ``time_s`` pass for the arm."""
         with self._lock:
             if self._other is not None:
-                self._heed_the_other(time_s)
+                self._other.go_on(time_s, self._pace.ros_s())
             self._arm.advance(time_s)
 
     def publish(self) -> None:
@@ -87,8 +88,7 @@ class ArmStation:
         fault = turn.fault
         with self._lock:
             if isinstance(fault, SecondClient) and fault.arm == self._name:
-                begin_m = self._arm.reading().setpoint.position_m
-                self._other = (begin_m, fault.speed_m_s) if turn.begins else None
+                self._change_other(fault.speed_m_s if turn.begins else None)
             if not isinstance(fault, ArmStops) or fault.arm != self._name:
                 return
             try:
@@ -101,7 +101,16 @@ class ArmStation:
                 self._topics.say(str(why), self._pace.ros_s)
             self._publish_state()
 
-    def _heed(self, command: str, act: Callable[[], None]) -> None:
+    def _change_other(self, speed_m_s: float | None) -> None:
+        """A second client begins, or ends."""
+        if self._other is not None:
+            self._other.close()
+            self._other = None
+        if speed_m_s is not None:
+            begin = self._arm.reading().setpoint
+            self._other = SecondCommander(self._rospy, self._name.upper(), begin, speed_m_s)
+
+    def _heed(self, command: str, act: Callable[[], None], node: str) -> None:
         refused = ""
         with self._lock:
             before, jaw_rad = self._arm.reading().setpoint, self._arm.jaw.goal_rad
@@ -115,25 +124,14 @@ class ArmStation:
             self._publish_state()
         way_m = float(np.linalg.norm(after.setpoint.position_m - before.position_m))
         facts: dict[str, Any] = {"refused": refused} if refused else {}
+        if node == self._rospy.get_name():
+            facts["by"] = "second client"
         turned = self._arm.jaw.goal_rad - jaw_rad
         self._witness.tell(
             "goal", now_s, arm=self._name, command=command, way_m=way_m, jaw=turned, **facts
         )
         if refused:
             self._topics.say(refused, self._pace.ros_s)
-
-    def _heed_the_other(self, time_s: float) -> None:
-        """What the second client wants now: on and on along x from where it began."""
-        if self._other is None:
-            return
-        begin_m, speed_m_s = self._other
-        goal_m = begin_m + np.array([speed_m_s * time_s, 0.0, 0.0])
-        self._other = (goal_m, speed_m_s)
-        now = self._arm.reading().setpoint
-        try:
-            self._arm.servo_cp(Pose(goal_m, now.rotation))
-        except Refused as why:
-            self._topics.say(f"(to the second client) {why}", self._pace.ros_s)
 
     def _publish_state(self) -> None:
         operating = self._arm.reading().operating

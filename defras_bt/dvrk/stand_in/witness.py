@@ -1,9 +1,10 @@
 """What really happened: the stand-in's own record, for judges of those who command it.
 
 One JSON object per line. ``event`` is "fault" (one begins or ends), "goal" (a command came in,
-``way_m``: how far it is from the last one of its kind, ``refused`` where it was), "arm" (an arm's
-true state, every 20 ms), "clock" (ROS time of world time 0). The cameras have a file of their own,
-with "picture": one left, ``faults`` being there.
+``way_m``: how far it is from the last one of its kind, ``refused`` where it was, ``by`` where a
+second client of the stand-in's own sent it), "arm" (an arm's true state, every 20 ms), "clock" (ROS
+time of world time 0). The cameras have a file of their own, with "picture": one left, ``faults``
+being there.
 """
 
 from __future__ import annotations

@@ -46,7 +46,9 @@ class Supervisor:
     def judge(self, now_s: float, lost: str) -> Standing:
         """``now_s`` on the clock of the stamps; ``lost``: why the connection is gone, if it is."""
         name = self._arm.name
-        trip = lost or self._state(now_s) or self._jumped() or self._astray()
+        trip = (
+            lost or self._arm.overheard() or self._state(now_s) or self._jumped() or self._astray()
+        )
         late = self._late()
         if not late:
             self._waits_since_s = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from defras_bt.dvrk.ros_packages import ros_module
@@ -23,7 +24,12 @@ from defras_bt.dvrk.transport.transport import Receive
 from defras_sim.geometry import Pose
 
 _QUEUE = 20
-_COMMANDS = ("servo_cp", "servo_cv", "servo_jp", "servo_jr", "servo_jf", "move_cp", "move_jp")
+_COMMANDS = (
+    *("servo_cp", "servo_cv", "servo_jp", "servo_jr", "servo_jf"),
+    *("move_cp", "move_jp", "move_jr"),
+)
+_JUST_S = 0.3
+"""So long somebody who commanded an arm is taken to go on."""
 
 
 class Ros1:
@@ -46,6 +52,8 @@ class Ros1:
         self._making = threading.Lock()
         self._subscribers: list[Any] = []
         self._newest_s = 0.0
+        self._overheard: dict[str, tuple[str, float]] = {}
+        """By arm: who else commanded it last, in words, and when."""
 
     def listen(self, arm: str, topic: str, receive: Receive) -> None:
         kind, read = self._reader(topic)
@@ -65,6 +73,16 @@ class Ros1:
         self._publisher(arm, "servo_cp", self._geometry.PoseStamped)
         self._publisher(arm, "jaw/servo_jp", self._sensor.JointState)
         self._publisher(arm, "hold", self._std.Empty)
+        for command in _COMMANDS:
+            self._subscribers.append(
+                self._rospy.Subscriber(
+                    f"/{arm}/{command}",
+                    self._rospy.AnyMsg,
+                    partial(self._overhear, arm, command),
+                    queue_size=_QUEUE,
+                    tcp_nodelay=True,
+                )
+            )
 
     def servo_cp(self, arm: str, frame_from_reported: Pose, frame: str) -> None:
         message = self._geometry.PoseStamped()
@@ -101,6 +119,10 @@ class Ros1:
         # A node that was killed stays on the master's list for ever.
         return tuple(sorted(node for node in others if node_lives(self._uri, node)))
 
+    def overheard(self, arm: str) -> str:
+        who, when_s = self._overheard.get(arm, ("", float("-inf")))
+        return who if self.now_s() - when_s < _JUST_S else ""
+
     def close(self) -> None:
         for one in (*self._subscribers, *self._publishers.values()):
             one.unregister()
@@ -108,6 +130,12 @@ class Ros1:
         self._publishers.clear()
         self._lifeline.close()
         self._rospy.signal_shutdown("defras has ended")
+
+    def _overhear(self, arm: str, command: str, message: Any) -> None:
+        # rospy tells the sender of a message nowhere else.
+        node = message._connection_header.get("callerid", "somebody without a name")
+        if node != self._rospy.get_name():
+            self._overheard[arm] = (f"{node} commands it as well ({command})", self.now_s())
 
     def _publisher(self, arm: str, topic: str, kind: Any) -> Any:
         found = self._publishers.get((arm, topic))

@@ -95,6 +95,10 @@ class Ros2:
         }
         return tuple(sorted(found - {own}))
 
+    def overheard(self, arm: str) -> str:
+        # Messages of ROS 2 do not say who sent them.
+        return ""
+
     def close(self) -> None:
         self._executor.shutdown()
         self._node.destroy_node()

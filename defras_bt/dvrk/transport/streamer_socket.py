@@ -109,6 +109,9 @@ class StreamerSocket:
     def commanders(self, arm: str) -> tuple[str, ...] | None:
         return None
 
+    def overheard(self, arm: str) -> str:
+        return ""
+
     def close(self) -> None:
         self._ended = True
         for own in self._sockets.values():

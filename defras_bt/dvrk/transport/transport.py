@@ -49,5 +49,9 @@ class Transport(Protocol):
         """Who besides us announced that they command the arm; None where that cannot be known.
         May wait for an answer."""
 
+    def overheard(self, arm: str) -> str:
+        """Who else has just commanded the arm, in words, whether it obeyed or not; "" while nobody
+        has, or where that cannot be known. Never waits. Listens from :meth:`announce` on."""
+
     def close(self) -> None:
         """Send and hear nothing more."""

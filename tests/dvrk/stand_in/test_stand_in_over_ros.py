@@ -123,6 +123,13 @@ def test_arms_cameras_and_faults_as_a_client_meets_them(ros_master, start_stand_
     servo.publish(setpoint.wait())
     assert "PAUSED" in error.wait(since=refusals).string
     state.wait(lambda m: m.state == "ENABLED", since=state.heard.index(paused))
+    # A second client commands over ROS as everybody does.
+    foreign = Ear(rospy, "/PSM1/servo_cp", geometry.PoseStamped)
+    was_m = setpoint.wait().pose.position.x
+    faults.publish("{fault: second_client, arm: psm1, speed_m_s: 0.01, duration_s: 0.5}")
+    stranger = foreign.wait()
+    assert stranger._connection_header["callerid"] != rospy.get_name()
+    setpoint.wait(lambda m: m.pose.position.x > was_m + 0.002)
     told_at_once: list[float] = []
     cameras.when_unusable(lambda: told_at_once.append(monotonic()))
     faults.publish("{fault: millimetres}")
@@ -136,9 +143,8 @@ def test_arms_cameras_and_faults_as_a_client_meets_them(ros_master, start_stand_
     assert running.end() == 0
     told = [json.loads(line) for line in witness.read_text().splitlines()]
     goals = [t for t in told if t["event"] == "goal" and t["command"] == "servo_cp"]
+    assert any("by" in t and "refused" not in t for t in goals)
+    goals = [t for t in goals if "by" not in t]
     assert [bool(t.get("refused")) for t in goals] == [False, True, True]
-    assert [t["fault"] for t in told if t["event"] == "fault"] == [
-        "paused",
-        "paused",
-        "millimetres",
-    ]
+    turns = [t["fault"] for t in told if t["event"] == "fault"]
+    assert sorted(turns) == ["millimetres", "paused", "paused", "second_client", "second_client"]
