@@ -12,7 +12,7 @@ from defras_bt.diagnosis.noise import tolerances
 from defras_bt.diagnosis.problem import Candidate, Covariate, Tangent
 from defras_bt.diagnosis.quality import DataQuality
 from defras_bt.diagnosis.recording import RecordedRun
-from defras_bt.diagnosis.twins.tissue_approximation import approximation_errors
+from defras_bt.diagnosis.twins.tissue_approximation import Accepted, approximation_errors
 from defras_bt.diagnosis.twins.tissue_cells import AssignedCloud
 from defras_bt.diagnosis.twins.tissue_frames import TissueFrames, before_the_camera
 from defras_bt.diagnosis.twins.tissue_models import LedModels, key_of
@@ -72,8 +72,7 @@ class TissueProblem:
         self.samples = samples_of(self.layout, self.trajectories, plain, left, corrected)
         self._corrected = _joined(corrected)
         """By how much less (n,) the model at hand leaves, its mesh's error put right."""
-        self._explained = np.zeros(len(self._corrected))
-        """What (n,) the causes of tissue and arms of the model at hand change."""
+        self._accepted: Accepted | None = None
 
     def residual(self, model: Extension) -> Floats:
         """Measured minus predicted (n,); see :class:`defras_bt.diagnosis.problem.Problem`."""
@@ -100,7 +99,8 @@ class TissueProblem:
         self._residuals.clear()
         self._tangents = None
         self._corrected = _joined(self._corrections(model))
-        self._explained = self.residual({}) - self.residual(before_the_camera(model))
+        explained = self.residual({}) - self.residual(before_the_camera(model))
+        self._accepted = Accepted(explained, self.residual(model))
         return True
 
     def tangents(self, model: Extension, candidate: Candidate) -> Sequence[Tangent]:
@@ -136,12 +136,12 @@ class TissueProblem:
     ) -> Values:
         """Standard error by parameter that the twin's own approximations make."""
         return systematic_errors(
-            self.samples, residual, candidate, columns, self._corrected, self._explained, rng
+            self.samples, residual, candidate, columns, self._corrected, self._accepted, rng
         )
 
     def approximations(self, count: int, rng: np.random.Generator) -> Floats:
         """Draws (n, count) of what the twin itself may be off by."""
-        return approximation_errors(self.samples, count, rng, self._explained)
+        return approximation_errors(self.samples, count, rng, self._accepted)
 
     def covariates(self) -> Sequence[Covariate]:
         """How high held tissue is carried, as told."""
