@@ -99,13 +99,14 @@ def _answer(row: BoardRow) -> str:
 
 
 def is_right(row: BoardRow) -> bool:
-    """Whether just what was hidden was named; at whichever site, where none is part of what was
-    hidden."""
-    return sorted(said_of(row, row.named)) == sorted(row.causes)
+    """Whether just what was hidden was named, and nothing left open; at whichever site, where none
+    is part of what was hidden."""
+    return row.verdict == "named" and sorted(said_of(row, row.named)) == sorted(row.causes)
 
 
 def _in_set(row: BoardRow) -> bool:
-    return set(row.causes) <= set(said_of(row, (*row.named, *row.alike)))
+    """Whether the verdict leaves open a set that holds what was hidden."""
+    return row.verdict == "set" and set(row.causes) <= set(said_of(row, (*row.named, *row.alike)))
 
 
 def said_of(row: BoardRow, keys: Sequence[str]) -> list[str]:

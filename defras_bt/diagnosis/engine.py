@@ -31,6 +31,8 @@ from defras_sim.geometry import Floats
 
 _FAR_ABOVE = 3.0
 """Of what chance reaches: no interval makes a cause doubtful that is above it."""
+_NOTICED = 0.05
+"""Of the held-out loss: what a cause has to be worth where chance reaches nothing at all."""
 _NARROWEST, _WIDEST = 0.02, 2.0
 """Steps over which derivatives are taken."""
 
@@ -140,7 +142,7 @@ def _may_be_absent(found: Findings, key: str) -> bool:
         search.held_out(search.fit, search.noise).total
     )
     limits = [each.threshold for each in search.rounds if each.accepted == key]
-    if limits and worse - 1.0 > _FAR_ABOVE * limits[-1]:
+    if limits and worse - 1.0 > max(_FAR_ABOVE * limits[-1], _NOTICED):
         return False
     strengths = [p for p in candidate.free if p.strength]
     estimated = found.estimates[key]

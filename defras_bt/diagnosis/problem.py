@@ -170,10 +170,12 @@ class Approximating(Protocol):
 
 @runtime_checkable
 class Approaching(Protocol):
-    """A problem whose twin can be made more accurate near one model."""
+    """A problem whose twin can be made more accurate near one model, and which knows how far it
+    may be off there."""
 
     def approach(self, model: Extension) -> bool:
-        """``model`` was accepted; whether residuals of models have changed by that."""
+        """Stand at ``model``; whether residuals of models have changed by that. What
+        :class:`Approximating` says is said of the model stood at last."""
         ...
 
 

@@ -101,6 +101,7 @@ class Search:
         weighing = self.fitted_with or self.noise
         rounds = self.settings.iterations
         self.fit = without(self.counted, self.fit, key, weighing, iterations=rounds)
+        self.counted.approach(self.fit.model)
         self.rounds.append(
             Round((), self.rounds[-1].threshold if self.rounds else 0.0, None, removed=key)
         )

@@ -15,6 +15,7 @@ import numpy as np
 from defras_bt.diagnosis.chance import known_noise, maxima
 from defras_bt.diagnosis.contest import accepted_of, accepted_together
 from defras_bt.diagnosis.diagnosis import Round
+from defras_bt.diagnosis.fitted import Fit
 from defras_bt.diagnosis.fitting import refine, without
 from defras_bt.diagnosis.held_out import Products
 from defras_bt.diagnosis.noise_bias import KnownNoise
@@ -81,9 +82,10 @@ def _forward(search: Search, told: Progress) -> bool:
 def _approach(search: Search, told: Progress) -> None:
     """Have the twin be accurate where the model stands now, and the fit follow it."""
     told(f"what the twin gets wrong of {', '.join(search.accepted())}", 1.0)
-    if not search.counted.approach(search.fit.model):
-        return
+    anew = search.counted.approach(search.fit.model)
     search.approached = True
+    if not anew:
+        return
     fit = replace(search.fit, residual=search.counted.residual(search.fit.model))
     search.fit = refine(search.counted, fit, search.noise, iterations=search.settings.iterations)
 
@@ -119,24 +121,30 @@ def _threshold(
     return max(float(np.quantile(chance, 1.0 - search.settings.false_alarm)), 0.0)
 
 
+def _without(search: Search, key: str) -> Fit:
+    """The present fit less one cause, the twin being as accurate for it."""
+    rounds = search.settings.iterations
+    less = without(search.counted, search.fit, key, search.noise, iterations=rounds)
+    if search.counted.approach(less.model):
+        less = replace(less, residual=search.counted.residual(less.model))
+        less = refine(search.counted, less, search.noise, iterations=rounds)
+    search.counted.approach(search.fit.model)
+    return less
+
+
 def _backward(search: Search, told: Progress) -> None:
-    """Take out causes that the others made superfluous."""
-    changed = True
-    while changed and len(search.accepted()) > 1:
-        changed = False
-        # Causes that began anew stand last, whenever they were accepted.
-        newest = next((each.accepted for each in reversed(search.rounds) if each.accepted), None)
-        for key in (each for each in search.accepted() if each != newest):
+    """Take out causes that the others made superfluous, the weakest first."""
+    while len(search.accepted()) > 1:
+        present = search.held_out(search.fit, search.noise).total
+        least: tuple[float, str, Fit] | None = None
+        for key in search.accepted():
             told(f"whether {key} is still needed", 0.5)
-            less = without(
-                search.counted, search.fit, key, search.noise, iterations=search.settings.iterations
-            )
-            gain = search.held_out(less, search.noise).total / (
-                search.held_out(search.fit, search.noise).total
-            )
-            if gain - 1.0 > search.rounds[-1].threshold:
-                continue
-            search.fit = less
-            search.rounds.append(replace(search.rounds[-1], trials=(), accepted=None, removed=key))
-            changed = True
-            break
+            less = _without(search, key)
+            gain = search.held_out(less, search.noise).total / present - 1.0
+            if least is None or gain < least[0]:
+                least = gain, key, less
+        if least is None or least[0] > search.rounds[-1].threshold:
+            return
+        _, key, search.fit = least
+        search.counted.approach(search.fit.model)
+        search.rounds.append(replace(search.rounds[-1], trials=(), accepted=None, removed=key))

@@ -39,18 +39,27 @@ def rivals(search: Search, key: str, confounding: Confounding, told: Progress) -
         nearer = _approached(search, fit)
         if not _rejected(search, key, rival, search.fit, nearer):
             found[rival] = nearer
+    # Whatever is asked next is asked of the accepted model.
+    search.counted.approach(search.fit.model)
     return found
 
 
 def _stood_together(search: Search, key: str, rival: str) -> bool:
     """Whether both were fitted beside the causes of the present model, in the same round."""
-    return search.accepted()[-1] == key and rival in search.fits.get(key, {})
+    then = search.fits.get(key, {}).get(rival)
+    beside = {each for each in search.fit.keys if each != key}
+    return (
+        search.accepted()[-1] == key
+        and then is not None
+        and {each for each in then.keys if each != rival} == beside
+    )
 
 
 def _approached(search: Search, fit: Fit) -> Fit:
     """``fit`` with the twin as accurate for it as for the accepted model."""
-    if set(fit.model) == set(search.fit.model) or not search.counted.approach(fit.model):
-        return fit
+    if set(fit.model) != set(search.fit.model):
+        # Sites of one effect share what the finer mesh says of it.
+        search.counted.approach(fit.model)
     fit = replace(fit, residual=search.counted.residual(fit.model))
     return refine(search.counted, fit, search.noise, iterations=search.settings.iterations)
 

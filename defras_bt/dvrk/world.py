@@ -143,13 +143,13 @@ class DvrkWorld:
         """Stop both arms and listen no more; grips stay as they are."""
         self.command(HOLD)
         self._report = self.stream_values()
+        # First, or a last picture would still stop arms that nobody drives any more.
+        self._cameras.close()
         try:
             self._servo.close()
         except ServoLost as lost:
             # It was ended, and the arms hold; who asks for the stream's numbers gets none.
             self._lost = str(lost)
-        finally:
-            self._cameras.close()
 
     def _stop_at_once(self) -> None:
         self._unseen_fault.set()

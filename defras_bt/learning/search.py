@@ -97,7 +97,7 @@ class AttachmentSearch:
 
     def _left_m(self, attached: Mask, cost: float) -> float:
         misfit = cost - float(self._cost.price(attached[None])[0])
-        count = sum(len(cells.points_m) for cells in self._cells)
+        count = sum(cells.mean.shape[0] for cells in self._cells)
         return float(self._settings.error_m * np.sqrt(2.0 * max(misfit, 0.0) / max(count, 1)))
 
     def cost(self, attached: Mask) -> float:

@@ -121,3 +121,35 @@ def test_intervals_hold_what_the_twin_is_off_by() -> None:
         widths[off] = (high - low) / 2
     assert widths[0.5] > 1.645 * 0.5
     assert widths[0.0] < 0.5 * widths[0.5]
+
+
+@dataclass
+class Coarse(_Wrapped):
+    """Off as if another cause were there too, until it is made accurate where the model stands."""
+
+    approaches: bool = True
+    stood: list[Extension] = field(default_factory=list)
+
+    def residual(self, model: Extension) -> Floats:
+        like = {"scale": {"q1_scale": 0.5}}
+        off = self.toy.residual({}) - self.toy.residual(like)
+        near = any(each and set(each) <= set(model) for each in self.stood)
+        return np.asarray(self.toy.residual(model) + (0.0 if near else off))
+
+    def approach(self, model: Extension) -> bool:
+        anew = self.approaches and model not in self.stood
+        if self.approaches:
+            self.stood.append(model)
+        return anew
+
+
+def test_what_a_coarse_twin_gets_wrong_is_not_named_once_it_is_accurate() -> None:
+    measured = toy(np.random.default_rng(3), {"offset": {"q2_offset": 3.0}})
+    stays = diagnose(Coarse(measured, approaches=False), np.random.default_rng(5))
+    assert sorted(cause.effect for cause in stays.verdict.causes) == ["offset", "scale"]
+    coarse = Coarse(measured)
+    found = diagnose(coarse, np.random.default_rng(5))
+    assert [cause.effect for cause in found.verdict.causes] == ["offset"]
+    value = found.verdict.causes[0].parameters["q2_offset"]
+    assert value.interval90[0] <= 3.0 <= value.interval90[1]
+    assert set(coarse.stood[-1]) == {"offset"}, "what is asked last is asked of what was named"

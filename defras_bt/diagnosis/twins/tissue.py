@@ -12,7 +12,7 @@ from defras_bt.diagnosis.noise import tolerances
 from defras_bt.diagnosis.problem import Candidate, Covariate, Tangent
 from defras_bt.diagnosis.quality import DataQuality
 from defras_bt.diagnosis.recording import RecordedRun
-from defras_bt.diagnosis.twins.tissue_approximation import Accepted, approximation_errors
+from defras_bt.diagnosis.twins.tissue_approximation import approximation_errors
 from defras_bt.diagnosis.twins.tissue_cells import AssignedCloud
 from defras_bt.diagnosis.twins.tissue_frames import TissueFrames, before_the_camera
 from defras_bt.diagnosis.twins.tissue_models import LedModels, key_of
@@ -72,7 +72,8 @@ class TissueProblem:
         self.samples = samples_of(self.layout, self.trajectories, plain, left, corrected)
         self._corrected = _joined(corrected)
         """By how much less (n,) the model at hand leaves, its mesh's error put right."""
-        self._accepted: Accepted | None = None
+        self._explained: Floats | None = None
+        """What (n,) the causes of tissue and arms of the model at hand change."""
 
     def residual(self, model: Extension) -> Floats:
         """Measured minus predicted (n,); see :class:`defras_bt.diagnosis.problem.Problem`."""
@@ -94,14 +95,14 @@ class TissueProblem:
 
     def approach(self, model: Extension) -> bool:
         """The mesh's error anew where ``model`` stands; see :class:`.problem.Approaching`."""
-        if not self._models.correct_at(model):
-            return False
-        self._residuals.clear()
-        self._tangents = None
+        anew = self._models.correct_at(model)
+        if anew:
+            self._residuals.clear()
+            self._tangents = None
         self._corrected = _joined(self._corrections(model))
         explained = self.residual({}) - self.residual(before_the_camera(model))
-        self._accepted = Accepted(explained, self.residual(model))
-        return True
+        self._explained = explained if model else None
+        return anew
 
     def tangents(self, model: Extension, candidate: Candidate) -> Sequence[Tangent]:
         """How predictions change with ``candidate``; what those of all share is found once."""
@@ -136,12 +137,12 @@ class TissueProblem:
     ) -> Values:
         """Standard error by parameter that the twin's own approximations make."""
         return systematic_errors(
-            self.samples, residual, candidate, columns, self._corrected, self._accepted, rng
+            self.samples, residual, candidate, columns, self._corrected, self._explained, rng
         )
 
     def approximations(self, count: int, rng: np.random.Generator) -> Floats:
         """Draws (n, count) of what the twin itself may be off by."""
-        return approximation_errors(self.samples, count, rng, self._accepted)
+        return approximation_errors(self.samples, count, rng, self._explained)
 
     def covariates(self) -> Sequence[Covariate]:
         """How high held tissue is carried, as told."""

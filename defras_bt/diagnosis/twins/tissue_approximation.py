@@ -6,13 +6,11 @@ errors of a camera that its scatter at rest does not tell), and another one for 
 motion; forces are off by a share of the largest one. How large errors are follows from the floors
 of the channels, which say how far models of one and the same tissue on different meshes differ:
 they are known before any data. What an accepted cause does is no better known than the twin's mesh
-lets it be: a share of that is wrong too, though no more than is left over, or else the largest
-cause would have weaker ones named beside it for what the mesh makes of it.
+lets it be: a share of that is wrong too, or else the largest cause would have weaker ones named
+beside it for what the mesh makes of it.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,27 +29,11 @@ ALIKE_M = 0.02
 """Distance over which the errors of patches are alike."""
 
 
-@dataclass(frozen=True)
-class Accepted:
-    """What accepted causes of tissue and arms change of the predictions (n,), and what is left over
-    (n,) beside them."""
-
-    explained: Floats
-    left: Floats
-
-    def wrong(self, samples: Samples, rows: NDArray[np.bool_]) -> Floats:
-        """By channel (c,), how much is wrong in what they explain over ``rows``: as much as meshes
-        disagree, and no more than there is left over that no sensor scatters."""
-        noise = np.array([channel.noise_sd for channel in samples.channels])
-        left = np.sqrt(np.maximum(_square(samples, rows, self.left) - noise**2, 0.0))
-        explained = np.sqrt(_square(samples, rows, self.explained))
-        return np.asarray(np.minimum(RELATIVE * explained, left))
-
-
 def approximation_errors(
-    samples: Samples, count: int, rng: np.random.Generator, accepted: Accepted | None = None
+    samples: Samples, count: int, rng: np.random.Generator, explained: Floats | None = None
 ) -> Floats:
-    """Draws (n, count) of the twin's own errors in the numbers that are compared."""
+    """Draws (n, count) of the twin's own errors in the numbers that are compared; ``explained``
+    (n,): what accepted causes of tissue and arms change of its predictions, if any are."""
     sd = np.array([SHARE * channel.floor for channel in samples.channels])
     field = _field(samples)
     found = np.zeros((len(samples.time_s), count))
@@ -64,18 +46,20 @@ def approximation_errors(
             if phase != rest:
                 passing = field @ rng.standard_normal((len(sd), count))
             rows = mine & (samples.phase == phase)
-            size = sd if accepted is None else np.hypot(sd, accepted.wrong(samples, rows))
+            size = sd
+            if explained is not None:
+                size = np.hypot(sd, RELATIVE * _root_mean_square(samples, rows, explained))
             drawn = size[:, None] * (lasting + passing) / np.sqrt(2.0)
             found[rows] = drawn[samples.channel[rows]]
     return found
 
 
-def _square(samples: Samples, rows: NDArray[np.bool_], values: Floats) -> Floats:
-    """Mean square (c,) by channel of ``values`` (n,) over ``rows``."""
+def _root_mean_square(samples: Samples, rows: NDArray[np.bool_], values: Floats) -> Floats:
+    """By channel (c,), of ``values`` (n,) over ``rows``."""
     known = rows & np.isfinite(values)
     count = np.bincount(samples.channel[known], minlength=len(samples.channels))
     total = np.bincount(samples.channel[known], values[known] ** 2, minlength=len(samples.channels))
-    return np.asarray(total / np.maximum(count, 1))
+    return np.asarray(np.sqrt(total / np.maximum(count, 1)))
 
 
 def _field(samples: Samples) -> Floats:

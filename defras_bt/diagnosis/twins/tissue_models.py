@@ -54,8 +54,10 @@ class LedModels:
         self._scene, self._trajectories, self._jobs = scene, tuple(trajectories), jobs
         self._led: OrderedDict[str, tuple[Prediction, ...] | None] = OrderedDict()
         plain, corrections, self.shapes = self._begin(effects)
-        self._corrections = {self._effects_of({}): corrections}
-        """By the effects of the model that they were computed for."""
+        self._corrections = {frozenset[str](): corrections}
+        """By the effects, beside those of the scene, of the model that they were computed for."""
+        self._corrected = {frozenset[str](): self._key({})}
+        """Which model that was, by the same."""
         self.plain = _applied(corrections, plain)
 
     def whole(self, model: Extension) -> dict[str, Values]:
@@ -79,11 +81,14 @@ class LedModels:
     def correct_at(self, model: Extension) -> bool:
         """Compute the mesh's error anew for ``model``, and put it right so in every model that has
         at least its effects; whether there is anything new. Where the finer mesh cannot follow,
-        the error stays that of a model with fewer effects."""
-        fine, whole = finer(self._scene), self.whole(model)
-        self.foresee([model])
+        the error stays that of a model with fewer effects. From now on models are guided by the
+        way of this one."""
+        fine, whole, effects = finer(self._scene), self.whole(model), self._effects_of(model)
         predicted = self._led_along(model)
-        if fine is None or predicted is None or self._key(model) == self._key({}):
+        if predicted is None:
+            return False
+        self._guide = predicted
+        if fine is None or self._corrected.get(effects) == self._key(model):
             return False
         ways = zip(self._trajectories, self.ways(model), strict=True)
         refined = Parallel(n_jobs=self._jobs, inner_max_num_threads=1)(
@@ -92,14 +97,17 @@ class LedModels:
         )
         if any(other is None for other in refined):
             return False
-        self._corrections[self._effects_of(model)] = tuple(
+        self._corrected[effects] = self._key(model)
+        self._corrections[effects] = tuple(
             self._correction(model, one, other, each)
             for one, other, each in zip(predicted, refined, self._trajectories, strict=True)
         )
         return True
 
     def _effects_of(self, model: Extension) -> frozenset[str]:
-        return frozenset(before_the_camera(self.whole(model)))
+        """What distinguishes ``model`` from the plain one: effects that it changes."""
+        plain, whole = before_the_camera(self.whole({})), before_the_camera(self.whole(model))
+        return frozenset(name for name in whole if whole[name] != plain.get(name))
 
     def _corrections_for(self, model: Extension) -> tuple[MeshCorrection, ...]:
         """Those of the largest part of ``model`` for which the error was computed."""
@@ -114,15 +122,9 @@ class LedModels:
         return self._led[key]
 
     def ways(self, model: Extension) -> tuple[KnownWay | None, ...]:
-        """Where the nodes of ``model``, or of the one led along last, went in every trajectory."""
-        led = self._led.get(self._key(model)) or self._last
-        return tuple(None if each is None else each.way for each in led)
-
-    @property
-    def _last(self) -> tuple[Prediction | None, ...]:
-        """Of the model that was asked for last and could be followed."""
-        followed = (led for led in reversed(self._led.values()) if led is not None)
-        return next(followed, (None,) * len(self._trajectories))
+        """Where the nodes of ``model``, or of the one that guides, went in every trajectory."""
+        led = self._led.get(self._key(model)) or self._guide
+        return tuple(each.way for each in led)
 
     def foresee(self, models: Sequence[Extension]) -> None:
         """Lead several models along at once, before they are asked for one by one."""
@@ -135,7 +137,7 @@ class LedModels:
 
     def _lead_along(self, models: Mapping[str, Extension]) -> None:
         """Predict tissue and arms of ``models`` by key, side by side, and remember them."""
-        near = [None if each is None else each.way for each in self._last]
+        near = [each.way for each in self._guide]
         work = [
             (self.whole(model), each, way)
             for model in models.values()
@@ -184,6 +186,7 @@ class LedModels:
             for one, each in zip(predicted, self._trajectories, strict=True)
         ]
         self._remember(self._key({}), predicted)
+        self._guide = tuple(each for each in predicted if each is not None)
         ways = list(zip(self._trajectories, self.ways({}), strict=True))
         refined = [
             delayed(led_along)(fine, whole, each, _sparse(each), finer_way(way, scene, fine))

@@ -8,7 +8,7 @@ import numpy as np
 
 from defras_bt.diagnosis.noise import tolerances
 from defras_bt.diagnosis.problem import Candidate, Samples
-from defras_bt.diagnosis.twins.tissue_approximation import RELATIVE, Accepted, approximation_errors
+from defras_bt.diagnosis.twins.tissue_approximation import RELATIVE, approximation_errors
 from defras_bt.diagnosis.twins.tissue_samples import LEFT_OF_MESH
 from defras_sim.geometry import Floats
 
@@ -21,7 +21,7 @@ def systematic_errors(
     candidate: Candidate,
     columns: Mapping[str, Floats],
     corrected: Floats,
-    accepted: Accepted | None,
+    explained: Floats | None,
     rng: np.random.Generator,
 ) -> dict[str, float]:
     """Standard error by free parameter, in its unit; 0 for those without one of ``columns``, the
@@ -31,7 +31,7 @@ def systematic_errors(
     carried through the fit. ``residual`` (n,) says which numbers are compared. What the finer mesh
     ``corrected`` (n,) tells the shape of what is still wrong: a part of the same goes on with
     every further refinement (Richardson), so draws have it too, more or less of it; and so they
-    have of what ``accepted`` causes explain, of which too much or too little changes their
+    have of what accepted causes ``explained`` (n,), of which too much or too little changes their
     strengths and leaves nothing over.
     """
     names = [p.name for p in candidate.free if p.name in columns]
@@ -45,10 +45,10 @@ def systematic_errors(
     white = matrix[known] / tolerance
     # Directions that nothing shows are not moved by errors either.
     inverse = np.linalg.pinv(white.T @ white, rcond=1e-9, hermitian=True)
-    drawn = approximation_errors(samples, _DRAWS, rng, accepted)
+    drawn = approximation_errors(samples, _DRAWS, rng, explained)
     known_shapes = [(LEFT_OF_MESH, corrected)]
-    if accepted is not None:
-        known_shapes.append((RELATIVE, accepted.explained))
+    if explained is not None:
+        known_shapes.append((RELATIVE, explained))
     for share, shape in known_shapes:
         drawn += share * np.outer(np.nan_to_num(shape), rng.standard_normal(_DRAWS))
     drawn = drawn[known] / tolerance

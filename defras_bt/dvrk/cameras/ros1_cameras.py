@@ -54,6 +54,8 @@ class Ros1Cameras:
         self._lock = Lock()
         self._readings = CameraReadings()
         self._faults: dict[str, str] = {}
+        self._untold: dict[str, str] = {}
+        """Faults that nobody has asked for yet, over or not."""
         self._act: Callable[[], None] = lambda: None
         self._last_s: dict[str, float] = {}
         self._parts: dict[str, Any] = {}
@@ -69,9 +71,10 @@ class Ros1Cameras:
             self._hear_endoscope(cameras.endoscope)
 
     def latest(self) -> CameraReadings:
-        """The newest readings; never waits."""
+        """The newest readings; never waits. A fault is told at least once, however short it was."""
         with self._lock:
-            return replace(self._readings, faults=dict(self._faults))
+            faults, self._untold = {**self._untold, **self._faults}, {}
+            return replace(self._readings, faults=faults)
 
     def now_s(self) -> float:
         """ROS time."""
@@ -197,5 +200,6 @@ class Ros1Cameras:
         with self._lock:
             is_new = name not in self._faults
             self._faults[name] = f"the {name} cannot be used: {fault}"
+            self._untold[name] = self._faults[name]
         if is_new:
             self._act()

@@ -34,8 +34,8 @@ class ChainEstimator:
     ``proposers`` are asked in turn. ``sure``: a hole is changed in a proposal where its network
     says with such a probability that it is otherwise than believed. The search changes at most
     ``most_holes`` holes, of those to which a network gives a chance of ``least_doubt`` or more.
-    Where it leaves more than ``enough_m`` of the fitted points the networks were wrong, and the
-    search begins again without them.
+    Where it leaves more than ``enough_m`` (root mean square of the fitted cells, half of what the
+    model itself may be off by) the networks were wrong, and the search begins again without them.
     """
 
     proposers: tuple[Proposer, ...]
@@ -47,7 +47,7 @@ class ChainEstimator:
     rounds: int = 4
     most_fitted: int = 3
     least_travel_m: float = 0.003
-    enough_m: float = 0.0002
+    enough_m: float = 0.0005
 
     def estimate(
         self, belief: Scene, keyframes: Sequence[Keyframe], rng: np.random.Generator
@@ -61,10 +61,10 @@ class ChainEstimator:
         try:
             case = Case.of(belief, keyframes, parts)
             proposals = self._proposals(case)
-            found = self._refined(case, proposals)
+            found, believed = self._refined(case, proposals)
         except NotRepeatable as fault:
             return kept(belief, f"the observed motion cannot be repeated: {fault}")
-        said = [proposal.probability for proposal in proposals[:1]]
+        said = [proposal.probability for proposal in believed[:1]]
         probability = pooled([*said, found.probability], belief.is_hole)
         return case.judged(found.attached, probability, self.rule, rng)
 
@@ -73,18 +73,21 @@ class ChainEstimator:
         asked = [each.propose(case.belief, case.keyframes, predicted) for each in self.proposers]
         return [proposal for proposal in asked if proposal is not None]
 
-    def _refined(self, case: Case, proposals: Sequence[Proposal]) -> SearchResult:
-        """The inverse estimate from the set that explains the fitted points best."""
+    def _refined(
+        self, case: Case, proposals: Sequence[Proposal]
+    ) -> tuple[SearchResult, Sequence[Proposal]]:
+        """The inverse estimate from the set that explains the fitted points best, and the proposals
+        that it came from: none where it is better without."""
         found = self._searched(case, proposals)
         if not proposals or found.left_m <= self.enough_m:
-            return found
+            return found, proposals
         try:
             start = coarse_search(case.belief, case.keyframes, case.parts, self.search)
             again = self._searcher(case).run(start, self.rounds)
         except NotRepeatable:
             # Only the other beginning is lost; whether the first one's end is believed is judged.
-            return found
-        return again if again.cost_after < found.cost_after else found
+            return found, proposals
+        return (again, ()) if again.cost_after < found.cost_after else (found, proposals)
 
     def _searched(self, case: Case, proposals: Sequence[Proposal]) -> SearchResult:
         belief = case.belief
