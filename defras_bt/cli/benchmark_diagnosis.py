@@ -111,7 +111,7 @@ def _cases(
 ) -> list[BoardCase]:
     usual = {
         # seeds, nulls, lacking, pairs. A run takes about 0.4 s of computing (coupon), 3 s (arm) and
-        # 60 s (tissue, one retraction): the quick ones together half an hour, on two cores.
+        # 60 s (tissue, one retraction): the quick ones together half an hour.
         ("coupon", True): (10, 200, 2, 6),
         ("arm", True): (2, 30, 1, 4),
         ("tissue", True): (1, 6, 0, 0),
