@@ -147,4 +147,6 @@ def test_arms_cameras_and_faults_as_a_client_meets_them(ros_master, start_stand_
     goals = [t for t in goals if "by" not in t]
     assert [bool(t.get("refused")) for t in goals] == [False, True, True]
     turns = [t["fault"] for t in told if t["event"] == "fault"]
-    assert sorted(turns) == ["millimetres", "paused", "paused", "second_client", "second_client"]
+    # The stand-in may be ended before its second client is.
+    assert turns[:3] == ["paused", "paused", "second_client"]
+    assert set(turns) == {"paused", "second_client", "millimetres"}
