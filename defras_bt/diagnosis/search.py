@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -96,12 +96,17 @@ class Search:
             return None
         return problem.approximations(count, self.rng)
 
+    def stand(self) -> None:
+        """Have the twin stand at the present model, and the fit see what that changes."""
+        if self.counted.approach(self.fit.model):
+            self.fit = replace(self.fit, residual=self.counted.residual(self.fit.model))
+
     def take_out(self, key: str) -> None:
         """Remove an accepted cause, and fit the others anew."""
         weighing = self.fitted_with or self.noise
         rounds = self.settings.iterations
         self.fit = without(self.counted, self.fit, key, weighing, iterations=rounds)
-        self.counted.approach(self.fit.model)
+        self.stand()
         self.rounds.append(
             Round((), self.rounds[-1].threshold if self.rounds else 0.0, None, removed=key)
         )

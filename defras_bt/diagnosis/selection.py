@@ -20,6 +20,7 @@ from defras_bt.diagnosis.fitting import refine, without
 from defras_bt.diagnosis.held_out import Products
 from defras_bt.diagnosis.noise_bias import KnownNoise
 from defras_bt.diagnosis.noise_search import noise_beside
+from defras_bt.diagnosis.problem import Approaching
 from defras_bt.diagnosis.ranking import Board, ranked, ranked_pairs, whitened_products
 from defras_bt.diagnosis.restarts import restart
 from defras_bt.diagnosis.search import Progress, Search, board_of
@@ -83,7 +84,7 @@ def _approach(search: Search, told: Progress) -> None:
     """Have the twin be accurate where the model stands now, and the fit follow it."""
     told(f"what the twin gets wrong of {', '.join(search.accepted())}", 1.0)
     anew = search.counted.approach(search.fit.model)
-    search.approached = True
+    search.approached = isinstance(search.counted.problem, Approaching)
     if not anew:
         return
     fit = replace(search.fit, residual=search.counted.residual(search.fit.model))
@@ -128,13 +129,14 @@ def _without(search: Search, key: str) -> Fit:
     if search.counted.approach(less.model):
         less = replace(less, residual=search.counted.residual(less.model))
         less = refine(search.counted, less, search.noise, iterations=rounds)
-    search.counted.approach(search.fit.model)
+    search.stand()
     return less
 
 
 def _backward(search: Search, told: Progress) -> None:
     """Take out causes that the others made superfluous, the weakest first."""
     while len(search.accepted()) > 1:
+        search.stand()
         present = search.held_out(search.fit, search.noise).total
         least: tuple[float, str, Fit] | None = None
         for key in search.accepted():
@@ -146,5 +148,5 @@ def _backward(search: Search, told: Progress) -> None:
         if least is None or least[0] > search.rounds[-1].threshold:
             return
         _, key, search.fit = least
-        search.counted.approach(search.fit.model)
+        search.stand()
         search.rounds.append(replace(search.rounds[-1], trials=(), accepted=None, removed=key))

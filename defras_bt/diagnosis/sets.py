@@ -40,7 +40,7 @@ def rivals(search: Search, key: str, confounding: Confounding, told: Progress) -
         if not _rejected(search, key, rival, search.fit, nearer):
             found[rival] = nearer
     # Whatever is asked next is asked of the accepted model.
-    search.counted.approach(search.fit.model)
+    search.stand()
     return found
 
 
