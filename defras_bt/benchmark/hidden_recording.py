@@ -21,7 +21,7 @@ from defras_sim.worlds.model_world import ModelWorld
 from defras_sim.worlds.protocol import PointCloud
 
 TICK_S = 0.04
-ELEMENTS_XYZ = (10, 10, 1)
+ELEMENTS_XYZ = (16, 16, 1)
 
 
 def reality(

@@ -56,6 +56,7 @@ def fit_plainly(search: Search) -> None:
         search.noise = estimate_noise(fit.residual, search.samples, search.layout)
         _drop_idle(search, white)
         _take_in_nuisances(search, white)
+        search.stand()
 
 
 def _promised(search: Search, white: Noise) -> bool:

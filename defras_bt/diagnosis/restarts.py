@@ -59,7 +59,8 @@ def _begun_anew(search: Search, key: str) -> bool:
     if search.held_out(again, search.noise).total > (1.0 - least) * present:
         return False
     search.fit = again
-    search.noise = estimate_noise(again.residual, search.samples, search.layout)
+    search.stand()
+    search.noise = estimate_noise(search.fit.residual, search.samples, search.layout)
     return True
 
 

@@ -32,6 +32,8 @@ def rivals(search: Search, key: str, confounding: Confounding, told: Progress) -
     models in which they take its place."""
     found = {}
     for rival, fit in _rival_fits(search, key, confounding, told).items():
+        # Each is judged with what is known of the accepted model, whoever was asked before.
+        search.stand()
         then = search.fits[key][key] if _stood_together(search, key, rival) else None
         # When both were tried, the twin was equally accurate for both.
         if then is not None and _rejected(search, key, rival, then, fit):

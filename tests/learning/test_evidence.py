@@ -51,3 +51,25 @@ def test_equal_predictions_are_no_evidence() -> None:
     assert found.touched_blocks == 0
     assert found.chance == 1.0
     assert found.relative_gain == 0.0
+
+
+def test_a_gain_in_a_small_patch_is_evidence_too() -> None:
+    """Four squares of 20 mm cannot gain by less chance than 1 in 16, however much they do."""
+    rng = np.random.default_rng(3)
+    at = places(rng)
+    error = np.abs(rng.normal(0.0, 0.0005, len(at)))
+    patch = np.linalg.norm(at - [0.02, 0.02], axis=1) < 0.015
+    found = compare(error + 0.002 * patch, error, at, rng)
+    assert found.chance < 0.01
+    assert found.local_gain_m > 0.0005
+
+
+def test_smooth_differences_in_a_small_patch_are_seldom_taken_for_evidence() -> None:
+    rng = np.random.default_rng(4)
+    false = 0
+    for _ in range(100):
+        at = places(rng)
+        patch = np.linalg.norm(at - [0.02, 0.02], axis=1) < 0.015
+        gain = 0.0005 * correlated(rng, at) * patch
+        false += compare(0.002 + gain, np.full(len(at), 0.002), at, rng).chance < 0.01
+    assert false <= 22
