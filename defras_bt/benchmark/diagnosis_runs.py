@@ -18,7 +18,7 @@ from defras_bt.benchmark.hidden_draw import NULL, draw
 from defras_bt.benchmark.hidden_noise import NoiseSpectrum
 from defras_bt.benchmark.hidden_recording import reality, record
 from defras_bt.benchmark.hidden_tables import arm_table, coupon_table
-from defras_bt.diagnosis.baselines import BASELINES, baseline
+from defras_bt.diagnosis.baselines import asked_of_baselines
 from defras_bt.diagnosis.diagnosis import Ranked
 from defras_bt.diagnosis.engine import diagnose
 from defras_bt.diagnosis.problem import Candidate, Problem, Samples, Tangent
@@ -149,8 +149,7 @@ def _asked(case: BoardCase, *, further: bool, baselines: bool) -> BoardRow:
         wall_s = time.perf_counter() - began
         others: dict[str, list[Any]] = {}
         if baselines:
-            for name in BASELINES:
-                said = baseline(name, problem)
+            for name, said in asked_of_baselines(problem).items():
                 others[name] = [bool(said.alarm), said.named]
     verdict = told.verdict
     gain = verdict.gain

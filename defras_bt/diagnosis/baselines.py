@@ -37,16 +37,17 @@ class BaselineVerdict:
     removed: float | None
 
 
-def baseline(name: BaselineName, problem: Problem) -> BaselineVerdict:
-    """What approach ``name`` says of ``problem``."""
+def asked_of_baselines(problem: Problem) -> dict[BaselineName, BaselineVerdict]:
+    """What each approach says of ``problem``."""
     samples = problem.samples
     residual = np.asarray(problem.residual({}), dtype=float)
-    if name == "median distance":
-        return _median(residual, samples)
     candidates = sketch(problem, {}, problem.candidates)
-    if name == "ridge on the residual":
-        return _ridge(residual, candidates, samples)
-    return _one_at_a_time(name, residual, candidates, samples)
+    return {
+        "median distance": _median(residual, samples),
+        "F-test": _one_at_a_time("F-test", residual, candidates, samples),
+        "BIC": _one_at_a_time("BIC", residual, candidates, samples),
+        "ridge on the residual": _ridge(residual, candidates, samples),
+    }
 
 
 def _median(residual: Floats, samples: Samples) -> BaselineVerdict:

@@ -66,7 +66,8 @@ class TissueProblem:
             _assigned(each, frames, scene, self.layout)
             for each, frames in zip(self.trajectories, plain, strict=True)
         )
-        self._tangents: tuple[str, TissueTangents] | None = None
+        self._tangents: dict[str, TissueTangents] = {}
+        """Near the plain model, and near one other."""
         self._residuals: OrderedDict[str, Floats] = OrderedDict()
         left, corrected = self._blocks(plain), self._corrections({})
         self.samples = samples_of(self.layout, self.trajectories, plain, left, corrected)
@@ -98,7 +99,7 @@ class TissueProblem:
         anew = self._models.correct_at(model)
         if anew:
             self._residuals.clear()
-            self._tangents = None
+            self._tangents = {k: t for k, t in self._tangents.items() if k == key_of({}) and model}
         self._corrected = _joined(self._corrections(model))
         explained = self.residual({}) - self.residual(before_the_camera(model))
         self._explained = explained if model else None
@@ -107,13 +108,14 @@ class TissueProblem:
     def tangents(self, model: Extension, candidate: Candidate) -> Sequence[Tangent]:
         """How predictions change with ``candidate``; what those of all share is found once."""
         key = key_of(model)
-        if self._tangents is None or self._tangents[0] != key:
+        if key not in self._tangents:
             shapes = () if model or self._to_score else self._models.shapes
             found = self._near(model, self.candidates, shapes)
             if found is None:
                 return ()
-            self._tangents = (key, found)
-        return self._tangents[1].of(candidate)
+            plain = {k: t for k, t in self._tangents.items() if k == key_of({})}
+            self._tangents = {**plain, key: found}
+        return self._tangents[key].of(candidate)
 
     def derivatives(
         self, model: Extension, candidates: Sequence[Candidate]
