@@ -24,7 +24,13 @@ from defras_bt.diagnosis.problem import Approaching
 from defras_bt.diagnosis.ranking import Board, ranked, ranked_pairs, whitened_products
 from defras_bt.diagnosis.restarts import restart
 from defras_bt.diagnosis.search import Progress, Search, board_of
-from defras_bt.diagnosis.short_list import contests, hopeful, nuisances, worth_naming
+from defras_bt.diagnosis.short_list import (
+    contests,
+    hopeful,
+    nuisances,
+    with_best_fitting,
+    worth_naming,
+)
 from defras_sim.geometry import Floats
 
 _FAR_ABOVE = 3.0
@@ -70,12 +76,13 @@ def _forward(search: Search, told: Progress) -> bool:
         return True
     worth = worth_naming(search, now, found, rows)
     tried = hopeful(search, worth, limit)
-    accepted = _contested(search, now, found, contests(now, found, tried), limit, told)
+    groups = with_best_fitting(search, contests(now, found, tried), worth, limit)
+    accepted = _contested(search, now, found, groups, limit, told)
     waiting = [row for row in nuisances(search, worth, limit) if row not in tried]
     if not accepted and waiting:
         # What is above chance and of no use may wait for a nuisance to be out of its way.
         accepted = _contested(search, now, found, contests(now, found, waiting), limit, told)
-    if not tried and not waiting:
+    if not groups and not waiting:
         search.rounds.append(Round((), limit, None))
     return accepted
 

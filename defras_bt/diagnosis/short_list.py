@@ -84,3 +84,19 @@ def contests(now: Board, found: Products, rows: Sequence[Ranked]) -> list[tuple[
         elif row.held_out > _NOT_MUCH_WORSE * home[0].held_out and len(home) < _IN_A_CONTEST:
             home.append(row)
     return [tuple(row.key for row in group) for group in groups[:_CONTESTS]]
+
+
+def with_best_fitting(
+    search: Search, groups: Sequence[tuple[str, ...]], worth: Sequence[Ranked], limit: float
+) -> list[tuple[str, ...]]:
+    """``groups``, of which the first has also to stand against the candidate that fits best.
+
+    What happens once, as a slip, is seen in one fold; of the others its linearised shape may
+    foretell little where the true one foretells nearly all.
+    """
+    proper = [row for row in worth if not search.sketch.candidate(row.key).nuisance]
+    best = max(proper, key=lambda row: row.gain, default=None)
+    if best is None or best.gain <= limit or any(best.key in group for group in groups):
+        return list(groups)
+    first, *others = groups or [()]
+    return [(*first, best.key), *others]

@@ -19,6 +19,7 @@ from defras_bt.diagnosis.twins.tissue_models import LedModels, key_of
 from defras_bt.diagnosis.twins.tissue_part import KeyShapes, TissuePart
 from defras_bt.diagnosis.twins.tissue_planned import Planner
 from defras_bt.diagnosis.twins.tissue_plans import plans
+from defras_bt.diagnosis.twins.tissue_pressed import PRESSED_REMARK
 from defras_bt.diagnosis.twins.tissue_samples import samples_of
 from defras_bt.diagnosis.twins.tissue_signals import Layout
 from defras_bt.diagnosis.twins.tissue_systematic import systematic_errors
@@ -152,17 +153,19 @@ class TissueProblem:
         return (Covariate("the height of the jaw", "m", np.concatenate(height)),)
 
     def remarks(self, model: Extension) -> Sequence[str]:
-        """What ``model`` changes of the warnings that the plain one gives."""
+        """Forces that are left out, and what ``model`` changes of the plain one's warnings."""
+        count = sum(each.pressed for each in self.trajectories)
+        left_out = (PRESSED_REMARK.format(count=count),) if count else ()
         plain, extended = self.frames({}), self.frames(model)
         if not model or plain is None or extended is None:
-            return ()
+            return left_out
         cells, phases = len(self.layout.grid), [each.phase for each in self.trajectories]
         delta_m = self.scene.thresholds.delta_m
         before, after = (
             warning_states([block[:cells] for block in self._blocks(frames)], phases, delta_m)
             for frames in (plain, extended)
         )
-        return (warnings_remark(before, after),)
+        return (*left_out, warnings_remark(before, after))
 
     @property
     def force_limit_n(self) -> float:

@@ -57,6 +57,7 @@ class TissuePart:
         self._trajectory, self._assigned, self._frames = trajectory, assigned, frames
         self.keyframes: Keyframes = keyframes(trajectory)
         self._paths = Paths(scene, trajectory)
+        self._by_grips: dict[str, Floats] = {}
 
     @property
     def trajectory(self) -> Trajectory:
@@ -128,10 +129,9 @@ class TissuePart:
             found[first : first + 3] = tips.T
         forces = self._frames.forces_n
         before, after = self._paths.held(plain, forces), self._paths.held(layers, forces)
-        moved = np.zeros((self._layout.rows, len(self.keyframes.chosen), 1))
         for one, other in zip(before, after, strict=True):
-            self._add_grip(moved, one, Carried.between(one, other), shapes)
-        return found + self.keyframes.expanded(moved)[:, :, 0]
+            found += self._with_grip(one, Carried.between(one, other), shapes)
+        return found
 
     def differentiated(self, shapes: KeyShapes, effect: str) -> dict[Place, Floats]:
         """Change per unit of each parameter of ``effect`` that has a derivative."""
@@ -179,32 +179,49 @@ class TissuePart:
             columns[:, index] = column
         return self.keyframes.expanded(columns)[:, :, 0]
 
-    def _add_grip(self, moved: Floats, grip: HeldPath, carried: Carried, shapes: KeyShapes) -> None:
-        """Add what a grip taken and carried elsewhere changes at its keyframes.
+    def _with_grip(self, grip: HeldPath, carried: Carried, shapes: KeyShapes) -> Floats:
+        """What a grip taken and carried elsewhere changes (rows, frames).
 
-        How high above the tissue a jaw closes makes no difference: the patch keeps its place in it.
+        What a jaw does is known for every frame, also where it changes at once, as by a slip. What
+        that does to the tissue changes slowly, and is known at the keyframes. How high above the
+        tissue a jaw closes makes no difference: the patch keeps its place in it.
         """
+        if grip.arm not in self._by_grips:
+            self._by_grips[grip.arm] = self._by_grip(grip.arm, shapes)
+        elsewhere = np.zeros((len(self._trajectory.frames), 8))
+        elsewhere[grip.frames, :3] = carried.farther_m
+        elsewhere[grip.frames, 3:6] = carried.turned_rad
+        elsewhere[grip.frames, 6:] = carried.beside_m[:2] / ASIDE_M
+        return np.einsum("rfk,fk->rf", self._by_grips[grip.arm], elsewhere)
+
+    def _by_grip(self, arm: str, shapes: KeyShapes) -> Floats:
+        """Change (rows, frames, 8) with the jaw of ``arm`` carrying held tissue farther (3),
+        turning it (3), and taking it aside (2)."""
+        columns = np.zeros((self._layout.rows, len(self.keyframes.chosen), 8))
         for index, frame in enumerate(self.keyframes.chosen):
-            at = int(np.searchsorted(grip.frames, frame))
-            if at == len(grip.frames) or grip.frames[at] != frame:
-                continue
             trio = [each[index] for each in (shapes.plain, shapes.aside_x, shapes.aside_y)]
             plain, aside_x, aside_y = trio
             if plain is None or aside_x is None or aside_y is None:
-                moved[:, index] = np.nan
+                columns[:, index] = np.nan
                 continue
-            shift = np.concatenate([carried.farther_m[at], carried.turned_rad[at]])
-            surface = plain.shift_by[grip.arm] @ shift
-            forces = {arm: plain.force_by_shift[arm, grip.arm] @ shift for arm in plain.forces_n}
-            for share, other in zip(
-                carried.beside_m[:2] / ASIDE_M, (aside_x, aside_y), strict=True
-            ):
-                surface = surface + share * (other.vertices_m - plain.vertices_m)
-                for arm in forces:
-                    forces[arm] = forces[arm] + share * (other.forces_n[arm] - plain.forces_n[arm])
-            moved[:, index] += self._responses[frame].to_surface(
-                surface[:, :, None], {arm: f[:, None] for arm, f in forces.items()}
+            if arm not in plain.shift_by:
+                continue
+            aside = (aside_x, aside_y)
+            beside = [(each.vertices_m - plain.vertices_m)[:, :, None] for each in aside]
+            forces = {
+                each: np.concatenate(
+                    (
+                        plain.force_by_shift[each, arm],
+                        *((a.forces_n[each] - force_n)[:, None] for a in aside),
+                    ),
+                    axis=1,
+                )
+                for each, force_n in plain.forces_n.items()
+            }
+            columns[:, index] = self._responses[frame].to_surface(
+                np.concatenate((plain.shift_by[arm], *beside), axis=2), forces
             )
+        return self.keyframes.expanded(columns)
 
     def _surface_at(self, time_s: float) -> Surface | None:
         """The surface between two frames; None where one is not known."""

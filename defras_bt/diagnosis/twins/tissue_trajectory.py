@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from defras_bt.diagnosis.problem import Integers
 from defras_bt.diagnosis.recording import Readings, RecordedRun
 from defras_bt.diagnosis.twins.tissue_phases import PHASES, phases
+from defras_bt.diagnosis.twins.tissue_pressed import pressed
 from defras_sim.geometry import Floats
 from defras_sim.recorded_motion import ArmMotion, RecordedMotion
 from defras_sim.scene import Scene
@@ -34,7 +35,8 @@ _RELEASED = PHASES.index("after release")
 class Trajectory:
     """``frames`` (f,): the instants of ``motion`` at which the camera looked, and ``clouds_m`` what
     it saw then; ``phase`` (f,) in :data:`PHASES`. By arm: ``tips_m`` (f, 3) as measured and
-    ``forces_n`` (f, 3), NaN where nothing was measured.
+    ``forces_n`` (f, 3), NaN where nothing was measured, or where a jaw presses on the bed:
+    ``pressed`` readings are left out.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Trajectory:
     clouds_m: tuple[Floats, ...]
     tips_m: Mapping[str, Floats]
     forces_n: Mapping[str, Floats]
+    pressed: int = 0
 
     @property
     def time_s(self) -> Floats:
@@ -113,6 +116,11 @@ def trajectory(run: RecordedRun, scene: Scene, most_frames: int = MOST_FRAMES) -
         return {arm: each.mean_around(time_s, period_s / 2) for arm, each in readings.items()}
 
     within_s = 3 * period_s
+    forces_n, left_out = around(run.forces_n), 0
+    for name, force_n in forces_n.items():
+        onto_bed = pressed(motion.arms[name], rows.astype(np.int64), force_n)
+        forces_n[name] = np.where(onto_bed[:, None], np.nan, force_n)
+        left_out += int(onto_bed.sum())
     return Trajectory(
         run.name,
         motion,
@@ -120,7 +128,8 @@ def trajectory(run: RecordedRun, scene: Scene, most_frames: int = MOST_FRAMES) -
         phase[rows],
         tuple(run.clouds[i].points_m for i in clouds),
         {arm: each.at(time_s, within_s) for arm, each in run.measured_m.items()},
-        around(run.forces_n),
+        forces_n,
+        left_out,
     )
 
 

@@ -11,6 +11,7 @@ from defras_bt.diagnosis.recording import RecordedRun
 from defras_bt.diagnosis.recording_reader import UnusableRecording, read_recording
 from defras_bt.diagnosis.twins.tissue import TissueProblem
 from defras_bt.diagnosis.twins.tissue_candidates import tissue_candidates
+from defras_sim.effects.grasp_slip import SLIDING_S
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 from tests.diagnosis.twins.tissue_twin_data import coarse, recorded
@@ -108,6 +109,27 @@ def test_tangents_foretell_what_the_full_model_does(problem: TissueProblem, key:
     assert np.corrcoef(true[known], told[known])[0, 1] > alike
     size = np.sqrt(np.mean(true[known] ** 2))
     assert np.sqrt(np.mean((true - told)[known] ** 2)) < off * size
+
+
+def test_a_slip_shows_at_once(problem: TissueProblem) -> None:
+    """Tissue jumps within a frame or two: what would be spread to the next keyframe dates it wrong,
+    and is hardly seen where noise remembers."""
+    candidate = CANDIDATES["grasp_slip"]
+    tangents = problem.tangents({}, candidate)
+    tangent = tangents[len(tangents) // 2]
+    values = tangent.values(np.ones(1), candidate.free)
+    since_s = problem.samples.time_s - values["time_s"]
+    just_after = (since_s > SLIDING_S) & (since_s < SLIDING_S + 0.5)
+    assert just_after.any()
+    true = problem.residual({}) - problem.residual({"grasp_slip": values})
+    told = tangent.columns[:, 0]
+    by_sensor = np.array([c.sensor for c in problem.samples.channels])[problem.samples.channel]
+    for sensor in ("cloud", "force"):
+        known = just_after & (by_sensor == sensor) & np.isfinite(true)
+        size = np.sqrt(np.mean(true[known] ** 2))
+        assert np.sqrt(np.mean((true - told)[known] ** 2)) < 0.45 * size, sensor
+        before = (since_s < 0.0) & (by_sensor == sensor)
+        assert np.abs(told[before]).max() == 0.0
 
 
 def test_every_candidate_has_a_way_to_begin(problem: TissueProblem) -> None:
