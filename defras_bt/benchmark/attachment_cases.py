@@ -19,6 +19,9 @@ Hidden = Literal["fewer", "more", "slip", "camera", "second_tool", "stiffness"]
 HIDDEN: tuple[Hidden, ...] = ("fewer", "more", "slip", "camera", "second_tool", "stiffness")
 OF_ATTACHMENTS: tuple[Hidden, ...] = ("fewer", "more")
 
+FIRST_SEED = 100_000
+"""Far from any seed of the training data."""
+
 _FAR_M = 0.04
 
 
@@ -53,6 +56,13 @@ class UpdateCase:
     @property
     def name(self) -> str:
         return f"{self.hidden} {self.seed}"
+
+
+def wrongly_believed(seed: int, updates: int) -> list[tuple[Hidden, int]]:
+    """So many seeds from ``seed`` on, with fewer and with more attachments in turn."""
+    return [
+        (OF_ATTACHMENTS[number % len(OF_ATTACHMENTS)], seed + number) for number in range(updates)
+    ]
 
 
 def draw_update(hidden: Hidden, seed: int) -> UpdateCase:

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
 
 from defras_bt.benchmark.attachment_cases import HIDDEN, OF_ATTACHMENTS
-from defras_bt.benchmark.attachments import NEAR_M, NOBODY, ORACLE
+from defras_bt.benchmark.attachment_scores import NEAR_M
+from defras_bt.benchmark.attachments import NOBODY, ORACLE
+from defras_bt.benchmark.intervals import median, share
 from defras_bt.benchmark.retraction import Row
-
-_CONFIDENCE = 0.95
-_DRAWS = 2000
 
 
 def summed_up(rows: Sequence[Row], names: Sequence[str]) -> list[dict[str, Any]]:
@@ -27,18 +25,18 @@ def summed_up(rows: Sequence[Row], names: Sequence[str]) -> list[dict[str, Any]]
             {
                 "estimator": name,
                 "updates": len(mine),
-                "adopted": _share([bool(v["adopted"]) for v in mine]),
-                "back, local": _share([bool(v.get("under_local")) for v in mine]),
-                "back, median": _share([bool(v.get("under_median")) for v in mine]),
-                "surface [mm]": _median([v.get("surface_median_mm") for v in mine]),
-                "surface, 95 % [mm]": _median([v.get("surface_95_mm") for v in mine]),
-                "force [%]": _median([_percent(v.get("force_error")) for v in mine]),
-                "F1": _median([v["f1"] for v in mine]),
-                "F1 of changes": _median([v["changes_f1"] for v in mine]),
+                "adopted": share([bool(v["adopted"]) for v in mine]),
+                "back, local": share([bool(v.get("under_local")) for v in mine]),
+                "back, median": share([bool(v.get("under_median")) for v in mine]),
+                "surface [mm]": median([v.get("surface_median_mm") for v in mine]),
+                "surface, 95 % [mm]": median([v.get("surface_95_mm") for v in mine]),
+                "force [%]": median([_percent(v.get("force_error")) for v in mine]),
+                "F1": median([v["f1"] for v in mine]),
+                "F1 of changes": median([v["changes_f1"] for v in mine]),
                 **_near(mine),
                 "calibration": round(_calibration_error(mine), 3),
-                "wall [s]": _median([v.get("wall_s") for v in mine]),
-                "computing [s]": _median([v.get("cpu_s") for v in mine]),
+                "wall [s]": median([v.get("wall_s") for v in mine]),
+                "computing [s]": median([v.get("cpu_s") for v in mine]),
             }
         )
     return lines
@@ -54,7 +52,7 @@ def torn_down(rows: Sequence[Row], names: Sequence[str]) -> list[dict[str, Any]]
             mine = _asked(rows, name, [hidden])
             line[hidden] = f"{sum(bool(v['adopted']) for v in mine)} of {len(mine)}"
         mine = _asked(rows, name, others)
-        line["wrongly adopted"] = _share([bool(v["adopted"]) for v in mine])
+        line["wrongly adopted"] = share([bool(v["adopted"]) for v in mine])
         lines.append(line)
     return lines
 
@@ -74,25 +72,6 @@ def _asked(rows: Sequence[Row], name: str, hidden: Sequence[str]) -> list[Any]:
         for row in rows
         if row.run == name and row.relation in hidden and row.values.get("asked")
     ]
-
-
-def _share(true: Sequence[bool]) -> str:
-    """In per cent, with the exact 95 % interval (Clopper and Pearson)."""
-    if not true:
-        return "-"
-    found = binomtest(sum(true), len(true)).proportion_ci(_CONFIDENCE)
-    return f"{100 * np.mean(true):.0f} ({100 * found.low:.0f} to {100 * found.high:.0f})"
-
-
-def _median(values: Sequence[float | None]) -> str:
-    """With a 95 % interval from a bootstrap over updates."""
-    known = np.array([value for value in values if value is not None])
-    if len(known) == 0:
-        return "-"
-    rng = np.random.default_rng(0)
-    drawn = np.median(rng.choice(known, size=(_DRAWS, len(known))), axis=1)
-    low, high = np.quantile(drawn, (0.025, 0.975))
-    return f"{np.median(known):.2f} ({low:.2f} to {high:.2f})"
 
 
 def _percent(value: float | None) -> float | None:

@@ -15,6 +15,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from defras_bt.benchmark.cases import SIMULATED, shipped
+from defras_bt.benchmark.preparations import FORCE_THRESHOLD_N
 from defras_bt.benchmark.retraction import Row
 from defras_bt.executive.executive import ExecutiveFailed
 from defras_bt.executive.operation import Operation, operate
@@ -39,9 +40,6 @@ CULPRIT: dict[Hidden, str] = {
 """Who should be blamed."""
 
 ASKS, BLAMES = "asks", "blames attachments"
-FORCE_THRESHOLD_N = 0.6
-"""Twice the median of the largest forces over the rehearsals of the 17 configurations."""
-
 _MOST_S = 60.0
 
 

@@ -19,6 +19,9 @@ from defras_bt.planning.robust import sampled_beliefs
 from defras_bt.planning.scene_hash import scene_hash
 from defras_sim.scene import Scene
 
+FORCE_THRESHOLD_N = 0.6
+"""About twice the median of the largest forces over the rehearsals of the 17 configurations."""
+
 
 @dataclass(frozen=True)
 class Preparations:

@@ -16,6 +16,7 @@ from defras_bt.cli.benchmark_dvrk_faults import dvrk_faults
 from defras_bt.cli.benchmark_executive import executive
 from defras_bt.cli.benchmark_faults import faults
 from defras_bt.cli.benchmark_monitor import monitor
+from defras_bt.cli.benchmark_probe import probe
 from defras_bt.cli.benchmark_retraction import table1, table2
 from defras_bt.cli.benchmark_stream import stream
 from defras_bt.cli.benchmark_tissue import tissue
@@ -38,6 +39,7 @@ app.command("diagnosis")(diagnosis)
 app.command("dvrk-faults")(dvrk_faults)
 app.command("faults")(faults)
 app.command("monitor")(monitor)
+app.command("probe")(probe)
 app.command("stream")(stream)
 app.command("tissue")(tissue)
 

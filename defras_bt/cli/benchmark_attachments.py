@@ -11,7 +11,13 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from defras_bt.benchmark.attachment_cases import HIDDEN, OF_ATTACHMENTS, Hidden
+from defras_bt.benchmark.attachment_cases import (
+    FIRST_SEED,
+    HIDDEN,
+    OF_ATTACHMENTS,
+    Hidden,
+    wrongly_believed,
+)
 from defras_bt.benchmark.attachment_summary import run_rows, summed_up, torn_down
 from defras_bt.benchmark.attachments import NOBODY, run_updates
 from defras_bt.benchmark.files import write_benchmark
@@ -20,9 +26,6 @@ from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
 from defras_bt.executive.operation import SIMULATED_WORLDS
 from defras_bt.learning.chain.estimators import ESTIMATORS, EstimatorName
-
-FIRST_SEED = 100_000
-"""Far from any seed of the training data."""
 
 
 def attachments(
@@ -108,8 +111,6 @@ def _names(text: str) -> list[EstimatorName]:
 
 def _cases(seed: int, updates: int, others: int) -> list[tuple[Hidden, int]]:
     """Other attachments first, of both kinds in turn."""
-    wrong = [
-        (OF_ATTACHMENTS[number % len(OF_ATTACHMENTS)], seed + number) for number in range(updates)
-    ]
     rest: list[Hidden] = [hidden for hidden in HIDDEN if hidden not in OF_ATTACHMENTS]
-    return [*wrong, *((hidden, seed + number) for number in range(others) for hidden in rest)]
+    others_too = ((hidden, seed + number) for number in range(others) for hidden in rest)
+    return [*wrongly_believed(seed, updates), *others_too]

@@ -12,7 +12,8 @@ from defras_bt.benchmark.attachment_cases import (
     UpdateCase,
     draw_update,
 )
-from defras_bt.benchmark.attachment_runs import Asked, asked_update
+from defras_bt.benchmark.attachment_driver import Asked
+from defras_bt.benchmark.attachment_runs import asked_update
 from defras_bt.benchmark.attachment_summary import summed_up, torn_down
 from defras_bt.benchmark.attachments import NOBODY, ORACLE, run_updates
 from defras_bt.benchmark.retraction import Row

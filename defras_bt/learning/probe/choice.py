@@ -35,6 +35,9 @@ DIRECTIONS: tuple[Floats, ...] = (
 )
 """Unit vectors along which what is held may be tugged: never down, towards the bed."""
 
+LEAST_DOUBT = 0.25
+"""A hole is in doubt where it is otherwise than believed with such a probability or more."""
+
 
 @dataclass(frozen=True)
 class Tug:
@@ -109,7 +112,11 @@ class ProbeChooser:
 
 
 def explanations_of(
-    belief: Scene, estimate: AttachmentEstimate, *, least: float = 0.25, most: int = 3
+    belief: Scene,
+    estimate: AttachmentEstimate,
+    *,
+    least: float = LEAST_DOUBT,
+    most: int = 3,
 ) -> list[Mask]:
     """The belief, and sets that the data hold for possible too; alone where nothing is doubtful.
 
@@ -117,8 +124,7 @@ def explanations_of(
     probability of ``least`` or more: all of them, and only the most probable half.
     """
     believed = belief.attached
-    said = estimate.probability
-    otherwise = np.where(believed, 1.0 - said, said) * belief.is_hole
+    otherwise = _otherwise(belief, estimate)
     doubtful = otherwise >= least
     found: list[Mask] = [believed]
     if not doubtful.any():
@@ -129,6 +135,19 @@ def explanations_of(
         if not any(np.array_equal(candidate, each) for each in found):
             found.append(candidate)
     return found[:most]
+
+
+def doubtful_holes(
+    belief: Scene, estimate: AttachmentEstimate, *, least: float = LEAST_DOUBT
+) -> Mask:
+    """Holes (holes,) that are otherwise than believed with a probability of ``least`` or more."""
+    return _otherwise(belief, estimate) >= least
+
+
+def _otherwise(belief: Scene, estimate: AttachmentEstimate) -> Floats:
+    """Probability (holes,) that a hole is otherwise than believed."""
+    said = estimate.probability
+    return np.where(belief.attached, 1.0 - said, said) * belief.is_hole
 
 
 def parting_m(states: Sequence[TissueState], camera: Camera) -> float:
