@@ -62,6 +62,17 @@ def test_a_gain_in_a_small_patch_is_evidence_too() -> None:
     found = compare(error + 0.002 * patch, error, at, rng)
     assert found.chance < 0.01
     assert found.local_gain_m > 0.0005
+    assert 1.0 < found.local_before_m / found.local_gain_m < 3.0
+
+
+def test_a_gain_of_a_few_squares_among_many_is_evidence_too() -> None:
+    """A dozen squares differ a little; that three of them gain much is not for their signs to say."""
+    rng = np.random.default_rng(6)
+    at = places(rng)
+    error = np.abs(rng.normal(0.0, 0.0005, len(at)))
+    patch = np.linalg.norm(at - [0.02, 0.02], axis=1) < 0.015
+    found = compare(error + 0.002 * patch + 0.0002 * correlated(rng, at), error, at, rng)
+    assert found.chance < 0.01
 
 
 def test_smooth_differences_in_a_small_patch_are_seldom_taken_for_evidence() -> None:
