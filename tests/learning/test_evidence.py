@@ -66,12 +66,13 @@ def test_a_gain_in_a_small_patch_is_evidence_too() -> None:
 
 
 def test_a_gain_of_a_few_squares_among_many_is_evidence_too() -> None:
-    """A dozen squares differ a little; that three of them gain much is not for their signs to say."""
+    """That four squares gain much is not for the signs of eight that lose a little to say."""
     rng = np.random.default_rng(6)
     at = places(rng)
     error = np.abs(rng.normal(0.0, 0.0005, len(at)))
-    patch = np.linalg.norm(at - [0.02, 0.02], axis=1) < 0.015
-    found = compare(error + 0.002 * patch + 0.0002 * correlated(rng, at), error, at, rng)
+    away_m = np.linalg.norm(at - [0.02, 0.02], axis=1)
+    better, worse = away_m < 0.015, (away_m > 0.025) & (away_m < 0.035)
+    found = compare(error + 0.002 * better, error + 0.0002 * worse, at, rng)
     assert found.chance < 0.01
 
 
