@@ -118,6 +118,8 @@ def trajectory(run: RecordedRun, scene: Scene, most_frames: int = MOST_FRAMES) -
     within_s = 3 * period_s
     forces_n, left_out = around(run.forces_n), 0
     for name, force_n in forces_n.items():
+        if name not in motion.arms:
+            continue  # a sensor of an arm that was told nothing
         onto_bed = pressed(motion.arms[name], rows.astype(np.int64), force_n)
         forces_n[name] = np.where(onto_bed[:, None], np.nan, force_n)
         left_out += int(onto_bed.sum())
