@@ -30,7 +30,9 @@ class AdoptionRule:
     ``relative_gain`` of the whole distance, at least ``explained`` of the part of it that is not
     the camera's noise, at least ``local_gain_m`` where anything changes, and must not make the
     worst neighbourhood of any frame worse by more than ``worse_m``. A camera that stands elsewhere,
-    fitted to the same points, must not do ``rival_share`` of it.
+    fitted to the same points, must not do ``rival_share`` of it. Nor must something unknown that
+    pulls at one place do better, by ``pull_gain_m`` where the two differ, than chance does in fewer
+    than ``pull_chance`` of cases; that is asked where less than ``beyond_doubt`` is explained.
 
     ``explained`` keeps other errors of the model from being blamed on attachments: set right where
     they were wrong, they explain about 80 to 90 %; bent to make up for a coarse mesh, 50 to 67 %
@@ -47,6 +49,9 @@ class AdoptionRule:
     local_gain_m: float = 0.0002
     worse_m: float = 0.0005
     rival_share: float = 0.7
+    pull_chance: float = 0.05
+    pull_gain_m: float = 0.0001
+    beyond_doubt: float = 0.96
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,11 @@ class Hearing:
         after_m, _ = distances_m(self.camera, self.parts.judging_points_m, self.after)
         return compare(before_m, after_m, rest_xy_m, rng)
 
+    def explained(self, evidence: Evidence) -> float:
+        """Share of the error that is not noise; above 1 where less is left than at rest."""
+        gain_m = evidence.before_m - evidence.after_m
+        return _share(gain_m, evidence.before_m - self._noise_m())
+
     def objection(self, rule: AdoptionRule, evidence: Evidence) -> str | None:
         """Why the proposal is not believed, in one sentence; None if it is."""
         change = (
@@ -78,8 +88,7 @@ class Hearing:
             and evidence.local_gain_m >= rule.local_gain_m
         ):
             return f"attachments do not explain this: {change}, too little to matter"
-        noise_m = self._noise_m()
-        explained = _share(evidence.before_m - evidence.after_m, evidence.before_m - noise_m)
+        noise_m, explained = self._noise_m(), self.explained(evidence)
         locally = _share(evidence.local_gain_m, evidence.local_before_m - noise_m)
         little = evidence.after_m - noise_m <= rule.left_m and locally >= rule.explained
         if not (explained >= rule.explained or little):

@@ -9,9 +9,11 @@ import numpy as np
 
 from defras_bt.learning.adoption import AdoptionRule, Hearing, distances_m
 from defras_bt.learning.estimate import AttachmentEstimate, Keyframe
+from defras_bt.learning.evidence import Evidence, compare
 from defras_bt.learning.hold_out import Split
 from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_bt.learning.search import Mask
+from defras_bt.learning.unknown_pull import best_pull
 from defras_sim.geometry import Floats
 from defras_sim.scene import Scene
 from defras_sim.tissue.state import TissueState
@@ -67,6 +69,8 @@ class Case:
             hearing = Hearing(belief.depth_camera, self.keyframes, self.parts, self.before, after)
             evidence = hearing.evidence(rng)
             objection = hearing.objection(rule, evidence)
+            if objection is None and hearing.explained(evidence) < rule.beyond_doubt:
+                objection = self._pulled(after, evidence, rule, rng)
         except NotRepeatable as fault:
             return kept(belief, f"the proposed attachments fail: {fault}", probability, before_m)
         changed = int(np.sum(attached != belief.attached))
@@ -79,6 +83,28 @@ class Case:
             reason=objection
             or f"{changed} changed holes bring points that were not fitted from "
             f"{1e3 * evidence.before_m:.2f} to {1e3 * evidence.after_m:.2f} mm",
+        )
+
+    def _pulled(
+        self,
+        after: Sequence[TissueState],
+        evidence: Evidence,
+        rule: AdoptionRule,
+        rng: np.random.Generator,
+    ) -> str | None:
+        """Why something unknown that pulls explains the points better; None where it does not."""
+        pull = best_pull(self.belief, self.replay, self.parts)
+        points_m = [self.parts.judging_points_m[frame] for frame in self.parts.fitted]
+        shapes = [after[frame] for frame in self.parts.fitted]
+        after_m, rest_xy_m = distances_m(self.belief.depth_camera, points_m, shapes)
+        rival = compare(after_m, np.abs(pull.residual_m), rest_xy_m, rng)
+        if rival.chance > rule.pull_chance or rival.local_gain_m < rule.pull_gain_m:
+            return None
+        x, y, _ = 1e3 * pull.place_m
+        return (
+            f"attachments do not explain this: points that were not fitted go from "
+            f"{1e3 * evidence.before_m:.2f} to {1e3 * evidence.after_m:.2f} mm, but something "
+            f"unknown that pulls at ({x:.0f}, {y:.0f}) mm would explain it better"
         )
 
 

@@ -23,6 +23,7 @@ BETTER = AdoptionRule(
     local_gain_m=0.0,
     worse_m=np.inf,
     rival_share=np.inf,
+    beyond_doubt=-np.inf,
 )
 """The least that an update has to do: make the model agree better with the judging points."""
 
