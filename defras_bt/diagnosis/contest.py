@@ -26,6 +26,8 @@ _ALONE = 0.8
 """Of what causes explain together."""
 _NEARLY_ASKED = 0.3
 """Of the step at which the twin was asked: beginnings above it are tried there as well."""
+_LEADS = 2
+"""How often fits follow the noise of the best of them."""
 _WIDTH = 0.25
 """Of a parameter's step, to both sides, over which a derivative is measured."""
 
@@ -156,7 +158,7 @@ def accepted_of(
             fits[key] = fit
     if not fits:
         return False
-    after = noise_after(search, fits, search.noise)
+    fits, after = _led_on(search, fits)
     trials = []
     for key, fit in fits.items():
         trial = _trial(search, key, fit, after)
@@ -178,6 +180,35 @@ def accepted_of(
         search.fit = _settled(search, accepted.key, after)
     search.noise = after
     return True
+
+
+def _led_on(search: Search, fits: dict[str, Fit]) -> tuple[dict[str, Fit], Noise]:
+    """Fits where the noise beside the best of them leads them, and that noise.
+
+    What the ranking took for noise may have been the cause. Where another fit is the best by then,
+    it is its noise that counts, for all of them anew.
+    """
+    noise = search.noise
+    best = _best(search, fits, noise)
+    for _ in range(_LEADS):
+        left = _noise_beside(search, fits[best], noise, best)
+        fits = {key: _led(search, fit, left) for key, fit in fits.items()}
+        before, noise = best, left
+        best = _best(search, fits, noise)
+        if best == before:
+            break
+    return fits, _noise_beside(search, fits[best], noise, best)
+
+
+def _led(search: Search, fit: Fit, noise: Noise) -> Fit:
+    """``fit`` from where it is; one that ends while steps promise something is misled by its
+    derivatives, and gets new ones."""
+    counted, rounds = search.counted, search.settings.iterations
+    led = refine(counted, fit, noise, iterations=rounds)
+    if led.arrived:
+        return led
+    fresh = differentiate(counted, led, np.full(len(led.free), _WIDTH))
+    return refine(counted, fresh, noise, iterations=rounds)
 
 
 def _fits_better(search: Search, fit: Fit, noise: Noise, limit: float) -> bool:
@@ -234,9 +265,17 @@ def _retuned(search: Search, fit: Fit, held_out: HeldOut, *without: str) -> Floa
 
 def noise_after(search: Search, fits: dict[str, Fit], noise: Noise) -> Noise:
     """Noise of the best of ``fits``, nuisances re-tuned."""
-    held_out = {key: search.held_out(fit, noise, key) for key, fit in fits.items()}
-    best = min(held_out, key=lambda key: held_out[key].total)
-    left = _retuned(search, fits[best], held_out[best], best)
+    best = _best(search, fits, noise)
+    return _noise_beside(search, fits[best], noise, best)
+
+
+def _best(search: Search, fits: dict[str, Fit], noise: Noise) -> str:
+    """Which of ``fits`` predicts held-out folds best."""
+    return min(fits, key=lambda key: search.held_out(fits[key], noise, key).total)
+
+
+def _noise_beside(search: Search, fit: Fit, noise: Noise, key: str) -> Noise:
+    left = _retuned(search, fit, search.held_out(fit, noise, key), key)
     return estimate_noise(left, search.samples, search.layout)
 
 

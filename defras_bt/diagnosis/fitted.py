@@ -88,7 +88,8 @@ def _name(model: Extension) -> str:
 @dataclass(frozen=True)
 class Fit:
     """``candidates`` fitted together. ``jacobian`` (n, k): change of the prediction per step of
-    each of ``free`` (candidate key, parameter); ``residual`` (n,)."""
+    each of ``free`` (candidate key, parameter); ``residual`` (n,). ``arrived``: whether no step was
+    promising any more when it ended."""
 
     candidates: tuple[Candidate, ...]
     model: Extension
@@ -96,6 +97,7 @@ class Fit:
     residual: Floats
     jacobian: Floats
     calls: int = 0
+    arrived: bool = True
 
     @property
     def keys(self) -> tuple[str, ...]:

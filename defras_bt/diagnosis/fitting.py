@@ -93,6 +93,7 @@ def refine(counted: CountedProblem, fit: Fit, noise: Noise, *, iterations: int) 
     model, residual, jacobian = fit.model, fit.residual, fit.jacobian.copy()
     damping = 1e-3
     loss = _loss(noise, residual)
+    arrived = True
     for number in range(iterations):
         step = _bounded_step(noise, residual, jacobian, damping, lower - place, upper - place)
         if np.abs(step).max() < 1e-4:
@@ -121,8 +122,10 @@ def refine(counted: CountedProblem, fit: Fit, noise: Noise, *, iterations: int) 
         damping = damping / 10.0
         if gained < _SMALLEST_GAIN:
             break
+    else:
+        arrived = False
     calls = counted.calls - before
-    return Fit(fit.candidates, model, fit.free, residual, jacobian, calls)
+    return Fit(fit.candidates, model, fit.free, residual, jacobian, calls, arrived)
 
 
 def differentiate(counted: CountedProblem, fit: Fit, widths: Floats) -> Fit:
