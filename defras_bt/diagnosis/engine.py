@@ -23,7 +23,7 @@ from defras_bt.diagnosis.problem import Approximating, Problem, Remarking
 from defras_bt.diagnosis.proposal import proposed_motion
 from defras_bt.diagnosis.search import Progress
 from defras_bt.diagnosis.selection import select
-from defras_bt.diagnosis.sets import rivals
+from defras_bt.diagnosis.sets import rivals, simpler
 from defras_bt.diagnosis.settings import Settings
 from defras_bt.diagnosis.verdict_building import diagnosis_of
 from defras_sim.effects.effect import EffectParameter, Values
@@ -112,8 +112,7 @@ def _settle(found: Findings, told: Progress) -> None:
         # The last that came is the one that the others may have called for.
         search.take_out(doubtful[-1])
         del found.estimates[doubtful[-1]]
-    for key in search.accepted():
-        found.rivals[key] = rivals(search, key, found.confounding, told)
+    _compare(found, told)
     told("which motion would tell causes apart", 0.55)
     found.proposed = proposed_motion(search, found.ambiguous())
     told("what each cause gains", 0.6)
@@ -125,6 +124,20 @@ def _settle(found: Findings, told: Progress) -> None:
     found.left = left_over(left, search.samples, search.noise, count, search.rng, off)
     told("what is excluded", 0.8)
     found.excluded, found.unseen = exclusions(search)
+
+
+def _compare(found: Findings, told: Progress) -> None:
+    """Rivals of every cause. A cause that explains no more than a special case of it gives way."""
+    search = found.search
+    for key in search.accepted():
+        alike = rivals(search, key, found.confounding, told)
+        special = simpler(search, key, alike)
+        if special is not None:
+            search.put_instead(key, special, alike[special])
+            del found.estimates[key]
+            _arrived(found)
+            key, alike = special, rivals(search, special, found.confounding, told)
+        found.rivals[key] = alike
 
 
 def _may_be_absent(found: Findings, key: str) -> bool:

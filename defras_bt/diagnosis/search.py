@@ -111,6 +111,14 @@ class Search:
             Round((), self.rounds[-1].threshold if self.rounds else 0.0, None, removed=key)
         )
 
+    def put_instead(self, key: str, other: str, fit: Fit) -> None:
+        """``fit``, in which ``other`` takes the place of the accepted cause ``key``."""
+        self.fit = fit
+        self.fits[other] = self.fits.get(key, {})
+        self.stand()
+        threshold = self.rounds[-1].threshold if self.rounds else 0.0
+        self.rounds.append(Round((), threshold, other, removed=key))
+
 
 def board_of(search: Search) -> Board:
     """Candidates that are still open, beside the present model."""

@@ -8,6 +8,7 @@ simulation: Williams 1970).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -46,6 +47,13 @@ def rivals(search: Search, key: str, confounding: Confounding, told: Progress) -
     return found
 
 
+def simpler(search: Search, key: str, found: Mapping[str, Fit]) -> str | None:
+    """Of the rivals ``found`` of an accepted cause, one that is a special case of it; None where
+    there is none."""
+    special = search.sketch.candidate(key).effect.special_cases
+    return next((r for r in found if search.sketch.candidate(r).effect.name in special), None)
+
+
 def _stood_together(search: Search, key: str, rival: str) -> bool:
     """Whether both were fitted beside the causes of the present model, in the same round."""
     then = search.fits.get(key, {}).get(rival)
@@ -82,6 +90,8 @@ def _rival_fits(
             continue
         if rival.nuisance and not mine.nuisance:
             continue  # re-tuned along all the time: it did not explain what was named
+        if mine.effect.name in rival.effect.special_cases:
+            continue  # it would say the same in more words
         if _stood_together(search, key, name):
             found[name] = fits[name]
             continue

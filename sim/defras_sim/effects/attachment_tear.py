@@ -44,6 +44,7 @@ class AttachmentTear(TissueEffect):
     falsified_by = "Tissue and force do not jump, and a pull repeated gives what it gave."
     excited_by = "A pull that loads the suspected attachments, then the same pull again."
     source = "Brittle failure: no healing, no creep."
+    special_cases = ("missing_attachment",)  # torn before anything moved
 
     def begin(self, values: Values, model: TissueModel) -> Evolution:
         return _Tearing(values, model.scene)

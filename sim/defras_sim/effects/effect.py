@@ -59,6 +59,9 @@ class Effect(ABC):
     excited_by: ClassVar[str]
     """The safe motion that shows it best."""
     source: ClassVar[str]
+    special_cases: ClassVar[tuple[str, ...]] = ()
+    """Names of effects that this one comes to at some values of its parameters. Where one of them
+    explains as much, it is the simpler explanation, and this one says nothing else."""
 
     def __repr__(self) -> str:
         return self.name
