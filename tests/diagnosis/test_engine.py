@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -91,17 +92,37 @@ def test_a_nuisance_is_named_only_where_nothing_else_explains_it() -> None:
     assert _named(own) == ["offset@q2"]
 
 
-def test_causes_that_cannot_be_told_apart_are_a_set() -> None:
+def _scale_like_coupling(**options: Any) -> Diagnosis:
+    """Both joints are told the same, so that a scale of q1 is a coupling from q2."""
     rng = np.random.default_rng(5)
     problem = toy(rng, {"scale": {"q1_scale": 0.6}}, channels=2)
     copied = [np.repeat(s[:, :1], 2, axis=1) for s in problem.setpoints]
     measured = [
         c + (m - s) for c, m, s in zip(copied, problem.measured, problem.setpoints, strict=True)
     ]
-    found = diagnose(ToyProblem(copied, measured), rng)
+    return diagnose(ToyProblem(copied, measured, **options), rng)
+
+
+def test_causes_that_cannot_be_told_apart_are_a_set() -> None:
+    found = _scale_like_coupling()
     assert found.verdict.verdict == "set"
     assert set(found.verdict.ambiguous) == {"scale", "coupling"}
     assert found.confounding.alike("scale@q1")[0] == "coupling@q1_from_q2"
+
+
+@pytest.mark.parametrize(
+    ("general", "special", "key"),
+    [("coupling", "scale", "scale@q1"), ("scale", "coupling", "coupling@q1_from_q2")],
+)
+def test_a_special_case_that_explains_as_much_is_named_instead(
+    general: str, special: str, key: str
+) -> None:
+    found = _scale_like_coupling(special_cases={general: (special,)})
+    assert found.verdict.verdict == "named"
+    assert _named(found) == [key]
+    (cause,) = found.verdict.causes
+    ((low, high),) = [p.interval90 for p in cause.parameters.values()]
+    assert 0.3 < low < high < 0.9
 
 
 class _Interrupted(ToyProblem):

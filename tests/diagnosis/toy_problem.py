@@ -82,6 +82,7 @@ class ToyProblem:
     blocks: int = 8
     leave_out: Sequence[str] = ()
     nuisance: Sequence[str] = ()
+    special_cases: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     calls: int = field(default=0)
 
     def __post_init__(self) -> None:
@@ -109,6 +110,8 @@ class ToyProblem:
                 ],
             ),
         }
+        for name, special in self.special_cases.items():
+            type(self.effects[name]).special_cases = special
         found = []
         for effect in self.effects.values():
             for p in effect.parameters:
