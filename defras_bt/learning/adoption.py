@@ -49,7 +49,7 @@ class AdoptionRule:
     local_gain_m: float = 0.0002
     worse_m: float = 0.0005
     rival_share: float = 0.7
-    pull_chance: float = 0.05
+    pull_chance: float = 0.02
     pull_gain_m: float = 0.0001
     beyond_doubt: float = 0.96
 

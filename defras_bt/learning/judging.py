@@ -93,10 +93,9 @@ class Case:
         rng: np.random.Generator,
     ) -> str | None:
         """Why something unknown that pulls explains the points better; None where it does not."""
-        pull = best_pull(self.belief, self.replay, self.parts)
-        points_m = [self.parts.judging_points_m[frame] for frame in self.parts.fitted]
-        shapes = [after[frame] for frame in self.parts.fitted]
-        after_m, rest_xy_m = distances_m(self.belief.depth_camera, points_m, shapes)
+        pull = best_pull(self.belief, self.keyframes, self.replay, self.parts)
+        points_m = self.parts.judging_points_m
+        after_m, rest_xy_m = distances_m(self.belief.depth_camera, points_m, after)
         rival = compare(after_m, np.abs(pull.residual_m), rest_xy_m, rng)
         if rival.chance > rule.pull_chance or rival.local_gain_m < rule.pull_gain_m:
             return None

@@ -7,13 +7,15 @@ that a hole holds with the force of a spring at rest, and anything else with any
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from defras_bt.learning.estimate import Keyframe
 from defras_bt.learning.hold_out import Split
 from defras_bt.learning.linearised import Indices
-from defras_bt.learning.misfit import misfit
+from defras_bt.learning.misfit import Misfit, misfit
 from defras_bt.learning.observed_cells import ObservedCells
 from defras_bt.learning.replay import NotRepeatable, Replay
 from defras_sim.geometry import Floats
@@ -32,16 +34,17 @@ _FORCE = slice(0, 3)
 class Pull:
     """The force at one place that explains the fitted cells best, anew in every fitted frame.
 
-    ``residual_m`` (n,): signed distance of the judging points of the fitted frames, in their order,
-    that it leaves; ``place_m`` (3,) at rest.
+    ``residual_m`` (n,): signed distance that it leaves of the judging points of all frames, in
+    their order; ``place_m`` (3,) at rest.
     """
 
     residual_m: Floats
     place_m: Floats
 
 
-def best_pull(belief: Scene, replay: Replay, parts: Split) -> Pull:
+def best_pull(belief: Scene, keyframes: Sequence[Keyframe], replay: Replay, parts: Split) -> Pull:
     """The tissue answers linearly around what is believed; forces are tried at every other hole.
+    Between the frames that are fitted they are interpolated in time.
 
     The tissue is thin: a force on its lower face moves the upper one as a force there would.
     Leaves ``replay`` with the shapes of the belief.
@@ -52,23 +55,25 @@ def best_pull(belief: Scene, replay: Replay, parts: Split) -> Pull:
     stiffness = belief.hole_stiffness_n_per_m(belief.attached)
     shapes = replay.repeat(stiffness)
     holes = _every_other_hole(belief)
-    fitted, judging = [], []
+    left_m = np.zeros(len(holes))
+    by_frame = []
     for frame, points in zip(parts.fitted, parts.fitted_points_m, strict=True):
         response = replay.response(frame, stiffness, holes)
-        fitted.append(_cells(belief, shapes[frame], points, response))
-        judging.append(_points(belief, shapes[frame], parts.judging_points_m[frame], response))
-    left_m = np.zeros(len(holes))
-    forces = []
-    for residual, jacobian in fitted:
-        by_hole = np.moveaxis(jacobian, 1, 0)
-        force = _least_squares(by_hole, residual)
-        left_m += np.abs(residual + (by_hole @ force[:, :, None])[:, :, 0]).sum(axis=1)
-        forces.append(force)
+        residual, jacobian = _cells(belief, shapes[frame], points, response)
+        force = _least_squares(jacobian, residual)
+        left_m += np.abs(residual + (jacobian @ force[:, :, None])[:, :, 0]).sum(axis=1)
+        by_frame.append(force)
     best = int(np.argmin(left_m))
-    residuals = [
-        residual + jacobian[:, best] @ force[best]
-        for (residual, jacobian), force in zip(judging, forces, strict=True)
-    ]
+    fitted_s = [keyframes[frame].stamp_s for frame in parts.fitted]
+    force_n = np.array([force[best] for force in by_frame])
+    residuals = []
+    for frame, points in enumerate(parts.judging_points_m):
+        if len(points) == 0:
+            continue
+        response = replay.response(frame, stiffness, holes[best : best + 1])
+        stamp_s = keyframes[frame].stamp_s
+        now_n = np.array([np.interp(stamp_s, fitted_s, along) for along in force_n.T])
+        residuals.append(_left_m(belief, shapes[frame], points, response, now_n))
     return Pull(np.concatenate(residuals), belief.holes_m[holes[best]])
 
 
@@ -82,24 +87,28 @@ def _every_other_hole(belief: Scene) -> Indices:
 def _cells(
     belief: Scene, shape: TissueState, points_m: Floats, response: HoleResponse
 ) -> tuple[Floats, Floats]:
-    """Residuals (cells,) and their derivative (cells, holes, 3) by the forces."""
+    """Residuals (cells,) and their derivative (holes, cells, 3) by the forces."""
     cells = ObservedCells.of(points_m)
-    compared = misfit(cells.points_m, shape.surface, belief.depth_camera)
-    if compared is None:
-        raise NotRepeatable("the model's tissue leaves the depth camera's picture")
-    return cells.residual_m(compared), cells.jacobian(compared, _forces_of(response))
+    compared = _compared(belief, shape, cells.points_m)
+    jacobian = cells.jacobian(compared, _forces_of(response))
+    return cells.residual_m(compared), np.moveaxis(jacobian, 1, 0)
 
 
-def _points(
-    belief: Scene, shape: TissueState, points_m: Floats, response: HoleResponse
-) -> tuple[Floats, Floats]:
-    """As of cells, for each point by itself."""
+def _left_m(
+    belief: Scene, shape: TissueState, points_m: Floats, response: HoleResponse, force_n: Floats
+) -> Floats:
+    """Residuals (n,) of points with ``force_n`` (3,) at the one hole of ``response``."""
+    compared = _compared(belief, shape, points_m)
+    return compared.residual_m + compared.jacobian(response.surface_m_per_n[:, :, 0, _FORCE]) @ (
+        force_n
+    )
+
+
+def _compared(belief: Scene, shape: TissueState, points_m: Floats) -> Misfit:
     compared = misfit(points_m, shape.surface, belief.depth_camera)
     if compared is None:
         raise NotRepeatable("the model's tissue leaves the depth camera's picture")
-    surface = _forces_of(response).surface_m_per_n
-    flat = compared.jacobian(surface.reshape(*surface.shape[:2], -1))
-    return compared.residual_m, flat.reshape(-1, *surface.shape[2:])
+    return compared
 
 
 def _forces_of(response: HoleResponse) -> HoleResponse:

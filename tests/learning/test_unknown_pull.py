@@ -47,18 +47,16 @@ def lifted(truth: Scene) -> list[Keyframe]:
 
 
 def _left_m(belief: Scene, keyframes: Sequence[Keyframe], attached: np.ndarray) -> float:
-    """Mean distance of the judging points of fitted frames."""
+    """Mean distance of the judging points."""
     parts = split(keyframes, 3, 0.003)
     shapes = Replay(belief, keyframes).repeat(belief.hole_stiffness_n_per_m(attached))
-    points = [parts.judging_points_m[frame] for frame in parts.fitted]
-    chosen = [shapes[frame] for frame in parts.fitted]
-    return float(distances_m(belief.depth_camera, points, chosen)[0].mean())
+    return float(distances_m(belief.depth_camera, parts.judging_points_m, shapes)[0].mean())
 
 
 def test_the_pull_is_found_near_the_instrument_and_explains_unfitted_points(
     truth: Scene, lifted: list[Keyframe]
 ) -> None:
-    pull = best_pull(truth, Replay(truth, lifted), split(lifted, 3, 0.003))
+    pull = best_pull(truth, lifted, Replay(truth, lifted), split(lifted, 3, 0.003))
     assert np.linalg.norm(pull.place_m[:2] - HELD_ELSEWHERE.position_m[:2]) < 0.02
     believed_m = _left_m(truth, lifted, truth.attached)
     # Noise is about 0.3 mm; the answer is linear and its places are 10 mm apart.
@@ -105,4 +103,4 @@ def test_a_motion_that_cannot_be_repeated_is_said(truth: Scene, lifted: list[Key
     away = Pose(np.array([0.5, 0.5, 0.0]))
     lost = [Keyframe(f.stamp_s, {"psm1": away}, f.tips, f.cloud_m) for f in lifted]
     with pytest.raises(NotRepeatable, match="grasp"):
-        best_pull(truth, Replay(truth, lost), split(lifted, 3, 0.003))
+        best_pull(truth, lost, Replay(truth, lost), split(lifted, 3, 0.003))
