@@ -40,6 +40,10 @@ class AdoptionRule:
     mostly one of noise, which is larger in a fold than at rest; it is enough then to explain as
     much of the error where predictions differ, if no more than ``left_m`` of the whole distance is
     neither noise nor explained.
+
+    ``beyond_doubt``: of some 450 simulated updates, a pull seemed to do better in eight that were
+    right, six of which explained 88 to 92 %; what unknown instruments and stiff spots made a
+    search propose explained 67 to 87 %.
     """
 
     chance: float = 0.01
@@ -51,7 +55,7 @@ class AdoptionRule:
     rival_share: float = 0.7
     pull_chance: float = 0.02
     pull_gain_m: float = 0.0001
-    beyond_doubt: float = 0.96
+    beyond_doubt: float = 0.88
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ def test_a_change_that_helps_is_refused_where_a_pull_helps_more(
         return replace(chain, rule=rule).estimate(truth, lifted, rng)
 
     assert learned(-np.inf).adopted
-    doubted = learned(0.96)
+    doubted = learned(0.88)
     assert not doubted.adopted
     assert "something unknown that pulls at" in doubted.reason
 
