@@ -114,7 +114,9 @@ class Search:
     def put_instead(self, key: str, other: str, fit: Fit) -> None:
         """``fit``, in which ``other`` takes the place of the accepted cause ``key``."""
         self.fit = fit
-        self.fits[other] = self.fits.get(key, {})
+        tried = self.fits.get(key, {})
+        # Rivals of the same round count as such only if it was tried in that round itself.
+        self.fits[other] = tried if other in tried else {}
         self.stand()
         threshold = self.rounds[-1].threshold if self.rounds else 0.0
         self.rounds.append(Round((), threshold, other, removed=key))

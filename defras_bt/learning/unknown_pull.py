@@ -26,6 +26,8 @@ from defras_sim.tissue.state import TissueState
 _RIDGE = 1e-3
 """Of the mean curvature: keeps a force from growing along a direction that the camera is blind
 to."""
+_LEAST = 1e-30
+"""The same, where it sees nothing at all [m²/N²]."""
 _FORCE = slice(0, 3)
 """Of the 9 numbers that a hole holds, the force; the others are moments."""
 
@@ -78,10 +80,11 @@ def best_pull(belief: Scene, keyframes: Sequence[Keyframe], replay: Replay, part
 
 
 def _every_other_hole(belief: Scene) -> Indices:
-    """Like the black squares of a chess board."""
+    """Like the black squares of a chess board; all holes where none lies on one."""
     columns, rows = belief.hole_counts
     black = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == 1
-    return np.flatnonzero(belief.is_hole & black.ravel())
+    chosen = np.flatnonzero(belief.is_hole & black.ravel())
+    return chosen if len(chosen) else np.flatnonzero(belief.is_hole)
 
 
 def _cells(
@@ -124,6 +127,8 @@ def _least_squares(jacobian: Floats, residual: Floats) -> Floats:
     """Force (holes, 3) at each hole alone, given (holes, cells, 3) and (cells,)."""
     normal = np.swapaxes(jacobian, 1, 2) @ jacobian
     mean = np.trace(normal, axis1=1, axis2=2) / 3.0
-    normal = normal + _RIDGE * mean[:, None, None] * np.eye(3)
+    # Where the camera sees nothing of what a force moves, there is none.
+    ridge = np.maximum(_RIDGE * mean, _LEAST)
+    normal = normal + ridge[:, None, None] * np.eye(3)
     pull = np.swapaxes(jacobian, 1, 2) @ residual
     return -np.asarray(np.linalg.solve(normal, pull[:, :, None]), float)[:, :, 0]

@@ -104,3 +104,12 @@ def test_a_motion_that_cannot_be_repeated_is_said(truth: Scene, lifted: list[Key
     lost = [Keyframe(f.stamp_s, {"psm1": away}, f.tips, f.cloud_m) for f in lifted]
     with pytest.raises(NotRepeatable, match="grasp"):
         best_pull(truth, lost, Replay(truth, lost), split(lifted, 3, 0.003))
+
+
+def test_a_frame_of_which_the_camera_saw_little_asks_for_no_force(
+    truth: Scene, lifted: list[Keyframe]
+) -> None:
+    newest = lifted[-1]
+    hidden = [*lifted[:-1], replace(newest, cloud_m=newest.cloud_m[:2])]
+    pull = best_pull(truth, hidden, Replay(truth, hidden), split(hidden, 3, 0.003))
+    assert np.isfinite(pull.residual_m).all()
