@@ -116,11 +116,11 @@ def _cases(
 ) -> list[BoardCase]:
     """Those of ``counts`` (seeds, nulls, lacking, pairs); as many as usual where None is given."""
     usual = {
-        # A run takes about 0.4 s of computing (coupon), 3 s (arm) and 70 s (tissue, one
-        # retraction): the quick ones together half an hour.
-        ("coupon", True): (10, 200, 2, 6),
-        ("arm", True): (2, 30, 1, 4),
-        ("tissue", True): (1, 6, 0, 0),
+        # A run takes about 0.4 s of computing (coupon), 4 s (arm) and 85 s (tissue, one
+        # retraction, with making the data): the quick ones together twenty minutes on two cores.
+        ("coupon", True): (10, 100, 2, 6),
+        ("arm", True): (2, 15, 1, 4),
+        ("tissue", True): (1, 4, 0, 0),
         ("coupon", False): (20, 200, 10, 30),
         ("arm", False): (10, 200, 5, 30),
         ("tissue", False): (5, 200, 3, 40),
