@@ -18,6 +18,12 @@ from defras_sim.scene_generator import draw_actual, draw_believed
 Hidden = Literal["fewer", "more", "slip", "camera", "second_tool", "stiffness"]
 HIDDEN: tuple[Hidden, ...] = ("fewer", "more", "slip", "camera", "second_tool", "stiffness")
 OF_ATTACHMENTS: tuple[Hidden, ...] = ("fewer", "more")
+_ANYWHERE: tuple[Hidden, ...] = ("slip", "camera", "second_tool")
+OF_OTHER_CAUSES: dict[str, tuple[Hidden, ...]] = {
+    "model": (*_ANYWHERE, "stiffness"),
+    "bullet": _ANYWHERE,
+}
+"""By world: PyBullet's tissue is the same all over and has no stiff spots."""
 
 FIRST_SEED = 100_000
 """Far from any seed of the training data."""
@@ -63,6 +69,11 @@ def wrongly_believed(seed: int, updates: int) -> list[tuple[Hidden, int]]:
     return [
         (OF_ATTACHMENTS[number % len(OF_ATTACHMENTS)], seed + number) for number in range(updates)
     ]
+
+
+def otherwise_wrong(seed: int, each: int, world: str) -> list[tuple[Hidden, int]]:
+    """So many seeds from ``seed`` on of each other mismatch that ``world`` can imitate."""
+    return [(hidden, seed + number) for number in range(each) for hidden in OF_OTHER_CAUSES[world]]
 
 
 def draw_update(hidden: Hidden, seed: int) -> UpdateCase:

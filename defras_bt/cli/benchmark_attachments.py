@@ -13,9 +13,7 @@ from rich.table import Table
 
 from defras_bt.benchmark.attachment_cases import (
     FIRST_SEED,
-    HIDDEN,
-    OF_ATTACHMENTS,
-    Hidden,
+    otherwise_wrong,
     wrongly_believed,
 )
 from defras_bt.benchmark.attachment_summary import run_rows, summed_up, torn_down
@@ -45,7 +43,8 @@ def attachments(
     """Retractions are led until monitoring warns; then every estimator is asked about the same.
 
     Half of the seeds have fewer attachments than believed, half have more. Other mismatches are
-    slips, bumped cameras, unknown second tools and stiff spots, for which nothing should change.
+    slips, bumped cameras, unknown second tools and (in the model world, whose tissue need not be
+    the same all over) stiff spots, for which nothing should change.
     Rows stay in the folder, so that --resume with more updates goes on from them.
 
     Example: defras benchmark attachments --world bullet --updates 60 --others 5
@@ -61,7 +60,7 @@ def attachments(
         rows = RowStore(out / f"{name}.rows.jsonl", question, resume=resume)
     except OtherBenchmark as error:
         raise UserError(str(error)) from error
-    cases = _cases(seed, updates, others)
+    cases = [*wrongly_believed(seed, updates), *otherwise_wrong(seed, others, world)]
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -107,10 +106,3 @@ def _names(text: str) -> list[EstimatorName]:
     if unknown or not asked:
         raise UserError(f"--estimators {text}: valid are {', '.join(ESTIMATORS)}")
     return [known[each] for each in asked]
-
-
-def _cases(seed: int, updates: int, others: int) -> list[tuple[Hidden, int]]:
-    """Other attachments first, of both kinds in turn."""
-    rest: list[Hidden] = [hidden for hidden in HIDDEN if hidden not in OF_ATTACHMENTS]
-    others_too = ((hidden, seed + number) for number in range(others) for hidden in rest)
-    return [*wrongly_believed(seed, updates), *others_too]

@@ -11,12 +11,16 @@ from defras_bt.benchmark.attachment_cases import (
     OF_ATTACHMENTS,
     UpdateCase,
     draw_update,
+    otherwise_wrong,
 )
 from defras_bt.benchmark.attachment_driver import Asked
 from defras_bt.benchmark.attachment_runs import asked_update
 from defras_bt.benchmark.attachment_summary import summed_up, torn_down
 from defras_bt.benchmark.attachments import NOBODY, ORACLE, run_updates
 from defras_bt.benchmark.retraction import Row
+from defras_sim.effects.layers import Layers
+from defras_sim.worlds.bullet_effects import in_bullet
+from defras_sim.worlds.error import CannotImitate
 
 SEED = 90_001
 
@@ -44,6 +48,21 @@ def test_what_is_believed_knows_nothing_of_what_is_hidden(hidden: str) -> None:
     if case.second_tool is not None:
         assert case.second_tool.arm not in case.believed.arms
         assert case.second_tool.arm in case.actual.arms
+
+
+def test_what_is_hidden_in_pybullet_is_what_its_tissue_can_have() -> None:
+    """A patient of each kind can be set up there; stiff spots are for the model world only."""
+    cases = otherwise_wrong(SEED, 2, "bullet")
+    assert [number for _, number in cases] == [SEED] * 3 + [SEED + 1] * 3
+    for hidden, number in cases:
+        actual = draw_update(hidden, number).actual
+        in_bullet(actual, Layers.of(actual.model.extension))
+    spot = draw_update("stiffness", SEED).actual
+    with pytest.raises(CannotImitate, match="inclusion"):
+        in_bullet(spot, Layers.of(spot.model.extension))
+    assert {hidden for hidden, _ in otherwise_wrong(SEED, 1, "model")} == (
+        set(HIDDEN) - set(OF_ATTACHMENTS)
+    )
 
 
 def test_an_update_is_asked_for_when_monitoring_warns(case: UpdateCase, asked: Asked) -> None:
