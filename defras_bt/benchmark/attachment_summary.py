@@ -44,7 +44,8 @@ def summed_up(rows: Sequence[Row], names: Sequence[str]) -> list[dict[str, Any]]
 
 def torn_down(rows: Sequence[Row], names: Sequence[str]) -> list[dict[str, Any]]:
     """Per estimator, how often something else was put down to attachments."""
-    others = [hidden for hidden in HIDDEN if hidden not in OF_ATTACHMENTS]
+    drawn = {row.relation for row in rows}
+    others = [hidden for hidden in HIDDEN if hidden not in OF_ATTACHMENTS and hidden in drawn]
     lines = []
     for name in names:
         line: dict[str, Any] = {"estimator": name}

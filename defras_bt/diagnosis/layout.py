@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from defras_bt.diagnosis.problem import Integers, Samples
 
@@ -41,6 +43,25 @@ class Layout:
     series: tuple[Series, ...]
     together: tuple[tuple[Series, ...], ...]
     size: int
+
+    @cached_property
+    def ends(self) -> Integers:
+        """First row of every series and the one after its last (s, 2)."""
+        return np.array([(one.start, one.stop) for one in self.series])
+
+    @cached_property
+    def slot(self) -> Integers:
+        """Step of every sample (n,) in its series."""
+        return np.concatenate([one.slot for one in self.series])
+
+    @cached_property
+    def channel(self) -> Integers:
+        """Of every series (s,)."""
+        return np.array([one.channel for one in self.series])
+
+    def counts(self, chosen: NDArray[np.bool_]) -> Integers:
+        """How many of the ``chosen`` samples (n,) are in every series (s,)."""
+        return np.add.reduceat(chosen.astype(np.int64), self.ends[:, 0])
 
 
 def layout(samples: Samples) -> Layout:

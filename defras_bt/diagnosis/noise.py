@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from defras_bt.diagnosis.autoregression import tamed
-from defras_bt.diagnosis.layout import Layout, Series
+from defras_bt.diagnosis.layout import Layout
 from defras_bt.diagnosis.problem import Channel, Samples
-from defras_bt.diagnosis.whitening import innovations
+from defras_bt.diagnosis.series import lagged_products, robust_sds, whitened
 from defras_sim.geometry import Floats
 
 _ORDERS = (0, 1, 2, 3, 4, 6, 8)
@@ -56,19 +55,21 @@ class Noise:
     def whiten(self, columns: Floats) -> Floats:
         """``columns`` (n, k) in units in which this noise is independent and of variance 1; zero
         where nothing is compared."""
-        found = np.zeros(columns.shape)
-        for one in self.layout.series:
-            keep = self.seen[one.rows]
-            if not keep.any():
-                continue
-            noise = self.channels[one.channel]
-            if keep.all():
-                own, slot = columns[one.rows], one.slot
-                found[one.rows] = innovations(own, slot, noise.ar, noise.innovation_sd)
-            else:
-                rows = np.arange(one.start, one.stop)[keep]
-                slot = one.slot[keep] - one.slot[keep][0]
-                found[rows] = innovations(columns[rows], slot, noise.ar, noise.innovation_sd)
+        at = self.layout.channel
+        order = np.array([len(c.ar) for c in self.channels])
+        ar = np.zeros((len(self.channels), max(order)))
+        for own, noise in zip(ar, self.channels, strict=True):
+            own[: len(noise.ar)] = noise.ar
+        sd = np.array([c.innovation_sd for c in self.channels])
+        found = whitened(
+            np.ascontiguousarray(columns, dtype=float),
+            self.seen,
+            self.layout.ends,
+            self.layout.slot,
+            ar[at],
+            order[at],
+            sd[at],
+        )
         found *= np.sqrt(self.weight)[:, None]
         return found
 
@@ -95,20 +96,14 @@ def estimate_noise(
     """
     seen = np.isfinite(residual)
     tolerance = tolerances(samples)
-    scale = np.array(
-        [
-            max(robust_sd(residual[(samples.channel == c) & seen]), 0.05 * tolerance[c])
-            for c in range(len(samples.channels))
-        ]
-    )
+    count = len(samples.channels)
+    seen_sd = robust_sds(residual, seen, samples.channel, count, _LARGEST)
+    scale = np.maximum(seen_sd, 0.05 * tolerance)
     standard = np.clip(residual / scale[samples.channel], -_LARGEST, _LARGEST)
     order = _largest_order(found, seen) if orders is None else max(orders)
-    moments = np.zeros((len(samples.channels), order + 1, order + 1))
-    counts = np.zeros(len(samples.channels))
-    for one in found.series:
-        windows = _windows(standard, seen, one, order)
-        moments[one.channel] += windows.T @ windows
-        counts[one.channel] += len(windows)
+    moments, counts = lagged_products(
+        standard, seen, found.ends, found.slot, found.channel, count, int(order)
+    )
     channels = _fitted(moments, counts, samples.channels, scale, orders)
     plain = Noise(found, channels, seen, np.ones(len(residual)))
     new = np.abs(plain.whiten(np.where(seen, residual, 0.0)[:, None])[:, 0])
@@ -116,30 +111,9 @@ def estimate_noise(
     return Noise(found, channels, seen, weight)
 
 
-def robust_sd(values: Floats) -> float:
-    """Root mean square about zero, outliers pulled in to four robust standard deviations."""
-    if not len(values):
-        return 0.0
-    middle = 1.4826 * float(np.median(np.abs(values)))
-    if middle > 0.0:
-        values = np.clip(values, -_LARGEST * middle, _LARGEST * middle)
-    return float(np.sqrt(np.mean(values**2)))
-
-
 def _largest_order(found: Layout, seen: NDArray[np.bool_]) -> int:
-    most = max(int(seen[one.rows].sum()) for one in found.series)
+    most = int(found.counts(seen).max())
     return max(order for order in _ORDERS if order == 0 or order <= most // 20)
-
-
-def _windows(standard: Floats, seen: NDArray[np.bool_], one: Series, order: int) -> Floats:
-    """Runs (m, order+1) of successive samples without a gap, the newest first."""
-    keep = seen[one.rows]
-    dense = np.full(one.length, np.nan)
-    dense[one.slot[keep]] = standard[one.rows][keep]
-    if len(dense) <= order:
-        return np.zeros((0, order + 1))
-    runs = sliding_window_view(dense, order + 1)[:, ::-1]
-    return runs[np.isfinite(runs).all(axis=1)]
 
 
 def _fitted(

@@ -148,11 +148,9 @@ def _without(
 def _cost(beside: Beside) -> float:
     """Twice the negative logarithm of the likelihood, and Schwarz's price of a candidate."""
     noise = beside.noise
-    total = 0.0
-    for one in noise.layout.series:
-        seen = int(noise.seen[one.rows].sum())
-        total += 2.0 * seen * np.log(noise.channels[one.channel].innovation_sd)
+    innovation_sd = np.array([c.innovation_sd for c in noise.channels])[noise.layout.channel]
     new = noise.whiten(np.nan_to_num(beside.remainder)[:, None])
+    total = 2.0 * float(noise.layout.counts(noise.seen) @ np.log(innovation_sd))
     total += float((new**2).sum())
     return total + len(beside.removed) * np.log(max(int(noise.seen.sum()), 2))
 

@@ -10,29 +10,19 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from defras_bt.diagnosis.autoregression import stationary_covariance
 from defras_bt.diagnosis.problem import Integers
 from defras_sim.geometry import Floats
 
 
-def innovations(values: Floats, slot: Integers, ar: Floats, innovation_sd: float) -> Floats:
-    """What is new in each row of ``values`` (n, k) at steps ``slot`` (n,), in its own standard
-    deviation: independent and of variance 1 if the columns are this noise."""
-    if not len(ar):
-        return np.asarray(values) / innovation_sd
-    return _filter(
-        np.ascontiguousarray(values, dtype=float),
-        slot,
-        ar,
-        innovation_sd**2,
-        stationary_covariance(ar, innovation_sd),
-    )
-
-
 @njit(cache=True, nogil=True)
-def _filter(
+def filtered(
     values: Floats, slot: Integers, ar: Floats, variance: float, covariance: Floats
 ) -> Floats:
+    """What is new in each row of ``values`` (n, k) at steps ``slot`` (n,), in its own standard
+    deviation: independent and of variance 1 if the columns are the noise of ``ar`` (p,).
+
+    ``variance`` of its innovations, ``covariance`` (p, p) of p successive values.
+    """
     rows, columns = values.shape
     order = len(ar)
     mean = np.zeros((order, columns))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 
-from defras_bt.diagnosis.autoregression import autoregression
-from defras_bt.diagnosis.whitening import innovations
+from defras_bt.diagnosis.autoregression import autoregression, stationary_covariance
+from defras_bt.diagnosis.whitening import filtered
 from defras_sim.geometry import Floats
 
 
@@ -30,9 +30,5 @@ def test_whitens_as_the_inverse_of_the_cholesky_factor_does(partial: list[float]
     covariance = _covariance(ar, 0.4, int(slot[-1]) + 1)[np.ix_(slot, slot)]
     values = rng.standard_normal((len(slot), 3))
     expected = np.linalg.solve(np.linalg.cholesky(covariance), values)
-    assert np.allclose(innovations(values, slot, ar, 0.4), expected, atol=1e-9)
-
-
-def test_without_autocorrelation_it_is_a_division() -> None:
-    values = np.ones((4, 1))
-    assert np.allclose(innovations(values, np.arange(4), np.zeros(0), 0.5), 2.0)
+    found = filtered(values, slot, ar, 0.4**2, stationary_covariance(ar, 0.4))
+    assert np.allclose(found, expected, atol=1e-9)
