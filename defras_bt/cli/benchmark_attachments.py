@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from defras_bt.benchmark.attachment_cases import (
@@ -19,9 +18,10 @@ from defras_bt.benchmark.attachment_cases import (
 from defras_bt.benchmark.attachment_summary import run_rows, summed_up, torn_down
 from defras_bt.benchmark.attachments import NOBODY, run_updates
 from defras_bt.benchmark.files import write_benchmark
-from defras_bt.benchmark.row_store import OtherBenchmark, RowStore
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
+from defras_bt.cli.kept import rows_in
+from defras_bt.cli.progress import counting, sentences
 from defras_bt.executive.operation import SIMULATED_WORLDS
 from defras_bt.learning.chain.estimators import ESTIMATORS, EstimatorName
 
@@ -53,21 +53,12 @@ def attachments(
     if world not in SIMULATED_WORLDS:
         raise UserError(f"--world {world}: valid are {' and '.join(SIMULATED_WORLDS)}")
     names = _names(estimators)
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    console = sentences()
     name = f"attachments_{world}"
     question = f"attachments, {world}, {','.join(names)}, seed {seed}"
-    try:
-        rows = RowStore(out / f"{name}.rows.jsonl", question, resume=resume)
-    except OtherBenchmark as error:
-        raise UserError(str(error)) from error
+    rows = rows_in(out, name, question, resume=resume)
     cases = [*wrongly_believed(seed, updates), *otherwise_wrong(seed, others, world)]
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+    with counting(console) as bar:
         ready = sum(row.run == NOBODY for row in rows.rows)
         task = bar.add_task("updates", total=len(cases), completed=ready)
         for row in run_updates(cases, names, world, jobs=jobs, done=rows.done):

@@ -9,15 +9,14 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from defras_bt.benchmark.blame import ASKS, BLAMES, HIDDEN, draw_case, run_blame
 from defras_bt.benchmark.files import write_benchmark
 from defras_bt.benchmark.retraction import Row
-from defras_bt.benchmark.row_store import OtherBenchmark, RowStore
-from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
+from defras_bt.cli.kept import rows_in
+from defras_bt.cli.progress import counting, sentences
 
 
 def blame(
@@ -37,19 +36,10 @@ def blame(
     Example: defras benchmark blame --runs 10 --out out/benchmark
     """
     folder_for(out)
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
-    try:
-        rows = RowStore(out / "blame.rows.jsonl", f"blame, seed {seed}", resume=resume)
-    except OtherBenchmark as error:
-        raise UserError(str(error)) from error
+    console = sentences()
+    rows = rows_in(out, "blame", f"blame, seed {seed}", resume=resume)
     cases = [draw_case(hidden, number) for number in range(seed, seed + runs) for hidden in HIDDEN]
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+    with counting(console) as bar:
         task = bar.add_task("runs", total=2 * len(cases), completed=len(rows.done))
         for row in run_blame(cases, jobs=jobs, done=rows.done):
             rows.add(row)

@@ -9,7 +9,6 @@ from typing import Annotated, Any, get_args
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from defras_bt.benchmark.diagnosis_boards import boards, in_words
@@ -18,6 +17,7 @@ from defras_bt.benchmark.diagnosis_runs import BoardRow, board_rows
 from defras_bt.benchmark.files import write_benchmark
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
+from defras_bt.cli.progress import counting, sentences
 from defras_sim.effects.effect import TwinName
 
 
@@ -56,15 +56,14 @@ def diagnosis(
     rows = _known(file, quick) if resume else []
     done = {row.key for row in rows}
     left = [case for case in cases if case.key not in done]
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
-    columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    console = sentences()
     with (
         file.open("a" if rows else "w", encoding="utf-8") as stream,
-        Progress(*columns, console=console, disable=not console.is_terminal) as bar,
+        counting(console) as bar,
     ):
         if not rows:
             stream.write(json.dumps({"quick": quick}) + "\n")
-        task = bar.add_task("", total=len(cases), completed=len(cases) - len(left))
+        task = bar.add_task("runs", total=len(cases), completed=len(cases) - len(left))
         for row in board_rows(left, further=not quick, baselines=True, jobs=jobs):
             rows.append(row)
             stream.write(json.dumps(row.as_dict()) + "\n")

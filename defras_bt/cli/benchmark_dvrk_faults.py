@@ -12,9 +12,10 @@ from rich.table import Table
 from defras_bt.benchmark.dvrk_fault_cases import KINDS
 from defras_bt.benchmark.dvrk_faults import DvrkRun, by_kind, by_run, campaign, row_of, run_of
 from defras_bt.benchmark.files import write_benchmark
-from defras_bt.benchmark.row_store import OtherBenchmark, RowStore
 from defras_bt.cli.errors import ExitCode, UserError
 from defras_bt.cli.files import folder_for
+from defras_bt.cli.kept import rows_in
+from defras_bt.cli.progress import sentences
 from defras_bt.dvrk.ros_packages import RosMissing, ros_module
 
 _NOTES = (
@@ -54,11 +55,8 @@ def dvrk_faults(
     except RosMissing as error:
         raise UserError(str(error)) from error
     folder_for(out)
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
-    try:
-        rows = RowStore(out / "dvrk_faults.rows.jsonl", "faults on a dVRK", resume=resume)
-    except OtherBenchmark as error:
-        raise UserError(str(error)) from error
+    console = sentences()
+    rows = rows_in(out, "dvrk_faults", "faults on a dVRK", resume=resume)
     for run in campaign(chosen, range(times), rows.done):
         rows.add(row_of(run))
         console.print(_told(run), markup=False)

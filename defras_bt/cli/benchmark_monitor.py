@@ -9,16 +9,15 @@ from typing import Annotated
 import numpy as np
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from defras_bt.benchmark.files import write_benchmark
 from defras_bt.benchmark.monitor import monitor_figure, monitor_tables
 from defras_bt.benchmark.monitor_runs import MonitorRun, monitor_runs, retractions
 from defras_bt.benchmark.preparations import prepared
-from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
-from defras_bt.planning.journal import InvalidJournal, Journal
+from defras_bt.cli.kept import rehearsals_in
+from defras_bt.cli.progress import counting, sentences
 
 
 def monitor(
@@ -37,19 +36,10 @@ def monitor(
     Example: defras benchmark monitor --out out/benchmark
     """
     folder_for(out)
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
-    try:
-        journal = Journal(out / "rehearsals.journal")
-    except InvalidJournal as error:
-        raise UserError(str(error)) from error
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
+    console = sentences()
+    journal = rehearsals_in(out)
     done: list[MonitorRun] = []
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+    with counting(console) as bar:
         task = bar.add_task("rehearsing the 17 configurations", total=None)
         preparations = prepared(
             "model",

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from defras_bt.benchmark.attachment_cases import FIRST_SEED, wrongly_believed
@@ -17,9 +16,10 @@ from defras_bt.benchmark.intervals import LEAST_PAIRS
 from defras_bt.benchmark.preparations import FORCE_THRESHOLD_N
 from defras_bt.benchmark.probe import BEFORE, run_probes
 from defras_bt.benchmark.probe_summary import compared, frequencies, run_rows, verdict
-from defras_bt.benchmark.row_store import OtherBenchmark, RowStore
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
+from defras_bt.cli.kept import rows_in
+from defras_bt.cli.progress import counting, sentences
 from defras_bt.executive.operation import SIMULATED_WORLDS
 
 
@@ -45,20 +45,11 @@ def probe(
     folder_for(out)
     if world not in SIMULATED_WORLDS:
         raise UserError(f"--world {world}: valid are {' and '.join(SIMULATED_WORLDS)}")
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    console = sentences()
     name = f"probe_{world}"
-    try:
-        rows = RowStore(out / f"{name}.rows.jsonl", f"probe, {world}, seed {seed}", resume=resume)
-    except OtherBenchmark as error:
-        raise UserError(str(error)) from error
+    rows = rows_in(out, name, f"probe, {world}, seed {seed}", resume=resume)
     cases = wrongly_believed(seed, updates)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+    with counting(console) as bar:
         ready = sum(row.run == BEFORE for row in rows.rows)
         task = bar.add_task("updates", total=len(cases), completed=ready)
         for row in run_probes(cases, world, jobs=jobs, done=rows.done):

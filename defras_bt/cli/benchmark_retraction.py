@@ -8,7 +8,6 @@ from typing import Annotated, get_args
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from defras_bt.benchmark.cases import Case, generated_cases, table1_cases, table2_cases
@@ -17,13 +16,13 @@ from defras_bt.benchmark.files import write_benchmark
 from defras_bt.benchmark.preparations import prepared
 from defras_bt.benchmark.retraction import ALL_RUNS, RUNS, TREES, Row, run_cases
 from defras_bt.benchmark.retraction_summary import by_case, spread, success
-from defras_bt.benchmark.row_store import OtherBenchmark, RowStore
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
+from defras_bt.cli.kept import rehearsals_in, rows_in
+from defras_bt.cli.progress import counting, sentences
 from defras_bt.dvrk.ros_packages import RosMissing, ros_module
 from defras_bt.dvrk.stand_in.order import WorldName
 from defras_bt.executive.operation import ROBOT_WORLD, WORLDS
-from defras_bt.planning.journal import InvalidJournal, Journal
 
 FIRST_UNSEEN_SEED = 10_000
 """Generated scenes of lower seeds were looked at while the trees were made."""
@@ -115,13 +114,10 @@ def _measure_dvrk(
     except RosMissing as error:
         raise UserError(str(error)) from error
     folder_for(out)
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    console = sentences()
     name, told = "table2_dvrk", f"{setting.patient} patient, imperfections {setting.imperfections}"
-    try:
-        rows = RowStore(out / f"{name}.rows.jsonl", f"{name}, {told}, seed {seed}", resume=resume)
-        journal = Journal(out / "rehearsals.journal")
-    except (OtherBenchmark, InvalidJournal) as error:
-        raise UserError(str(error)) from error
+    rows = rows_in(out, name, f"{name}, {told}, seed {seed}", resume=resume)
+    journal = rehearsals_in(out)
     console.print("Rehearsing the 17 configurations for the force threshold", markup=False)
     preparations = prepared(setting.patient, jobs=jobs, journal=journal)
     cases = table2_cases()
@@ -156,21 +152,12 @@ def _measure(
     if unknown := [run for run in runs if run not in ALL_RUNS]:
         raise UserError(f"--trees {','.join(unknown)}: valid are {', '.join(ALL_RUNS)}")
     folder_for(out)  # before the runs, not after
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    console = sentences()
     question = f"{name}, {world} world, seed {seed}"
-    try:
-        rows = RowStore(out / f"{name}.rows.jsonl", question, resume=resume)
-        journal = Journal(out / "rehearsals.journal")
-    except (OtherBenchmark, InvalidJournal) as error:
-        raise UserError(str(error)) from error
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
+    rows = rows_in(out, name, question, resume=resume)
+    journal = rehearsals_in(out)
     wanted = {f"{case.name} {case.relation} {run}" for case in cases for run in runs}
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+    with counting(console) as bar:
         task = bar.add_task("rehearsing the 17 configurations", total=None)
         preparations = prepared(
             world,

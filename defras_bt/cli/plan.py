@@ -11,10 +11,10 @@ import numpy as np
 import typer
 from pydantic import ValidationError
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import find_scene, folder_for
+from defras_bt.cli.progress import counting
 from defras_bt.executive.operation import WORLDS
 from defras_bt.planning.advice_file import add_advice, rule_name
 from defras_bt.planning.engine import (
@@ -197,15 +197,7 @@ def rehearsed(
 @contextmanager
 def _progress(console: Console) -> Iterator[Report]:
     """A bar with the time left; off a terminal a line at every fifth of the way."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
+    with counting(console, transient=True) as bar:
         task = bar.add_task("rehearsing grasp points", total=None)
 
         def report(done: int, total: int) -> None:

@@ -10,10 +10,10 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
+from defras_bt.cli.progress import counting, sentences
 
 app = typer.Typer(help="Make training data, and train networks on it.", no_args_is_help=True)
 
@@ -127,7 +127,7 @@ def _train(
         raise UserError(f"--width: {error}") from error
     folder = out or Path(f"out/train-{name}")
     folder_for(folder)
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    console = sentences()
     try:
         card = train_network(
             "banet" if name == "banet" else "sequence",
@@ -148,13 +148,7 @@ def _train(
 @contextmanager
 def _bar(what: str, total: int) -> Iterator[Callable[[int], None]]:
     """A progress bar; what is yielded moves it on by so many."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
     console = Console(stderr=True)
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+    with counting(console) as bar:
         task = bar.add_task(what, total=total)
         yield lambda count: bar.advance(task, count)
