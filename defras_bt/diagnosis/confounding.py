@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -40,8 +41,13 @@ def confounding_of(candidates: Sketch, samples: Samples, noise: Noise | None = N
     ]
     bases: dict[str, list[Floats]] = {}
     shift, shift_after = np.zeros(len(keys)), np.zeros(len(keys))
+    projected: dict[tuple[str, ...], Floats] = {}
     for index, key in enumerate(keys):
-        others = _basis([*always, *candidates.nuisances(key)], weighed, len(tolerance))
+        fitted_along = [*always, *candidates.nuisances(key)]
+        names = tuple(option.key for option in fitted_along)
+        if names not in projected:
+            projected[names] = _basis(fitted_along, weighed, len(tolerance))
+        others = projected[names]
         bases[key] = []
         for option in candidates.options[key]:
             columns = weighed(option.columns)
@@ -52,16 +58,31 @@ def confounding_of(candidates: Sketch, samples: Samples, noise: Noise | None = N
             shift_after[index] = max(shift_after[index], after / size)
             if after > 1e-6 * max(before, 1e-12):
                 bases[key].append(_orthonormal(left))
-    cosine = np.eye(len(keys))
-    for i, first in enumerate(keys):
+    return Confounding(keys, _cosines([bases[key] for key in keys]), shift, shift_after)
+
+
+def _cosines(bases: Sequence[Sequence[Floats]]) -> Floats:
+    """Largest cosine (k, k) between what two candidates can do, in any of their ways: ``bases`` has
+    for each an orthonormal one (n, m) of every way."""
+    cosine = np.eye(len(bases))
+    stacks = [np.concatenate(own, axis=1) if own else np.zeros((0, 0)) for own in bases]
+    ends = [np.cumsum([0, *(one.shape[1] for one in own)]) for own in bases]
+    for i, first in enumerate(stacks):
         for j in range(i):
-            found = [
-                float(np.linalg.norm(one.T @ other, 2))
-                for one in bases[first]
-                for other in bases[keys[j]]
-            ]
-            cosine[i, j] = cosine[j, i] = min(max(found, default=0.0), 1.0)
-    return Confounding(keys, cosine, shift, shift_after)
+            if not first.size or not stacks[j].size:
+                continue
+            product = first.T @ stacks[j]
+            found = 0.0
+            for top, bottom in pairwise(ends[i]):
+                if np.linalg.norm(product[top:bottom]) <= found:
+                    continue  # no block is larger in its 2-norm
+                for start, stop in pairwise(ends[j]):
+                    block = product[top:bottom, start:stop]
+                    # Of a row or a column the 2-norm is its length.
+                    order = 2 if min(block.shape) > 1 else None
+                    found = max(found, float(np.linalg.norm(block, order)))
+            cosine[i, j] = cosine[j, i] = min(found, 1.0)
+    return cosine
 
 
 def _basis(options: list[Option], weighed: Callable[[Floats], Floats], size: int) -> Floats:
