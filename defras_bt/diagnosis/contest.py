@@ -195,7 +195,7 @@ def _led_on(search: Search, fits: dict[str, Fit]) -> tuple[dict[str, Fit], Noise
         fits = {key: _led(search, fit, left) for key, fit in fits.items()}
         before, noise = best, left
         best = _best(search, fits, noise)
-        if best == before:
+        if best == before or search.is_spent:
             break
     return fits, _noise_beside(search, fits[best], noise, best)
 

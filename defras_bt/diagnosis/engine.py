@@ -71,7 +71,7 @@ def diagnose(
             found.remarks += tuple(problem.remarks(found.search.fit.model))
         if found.search.was_cut_short:
             found.remarks += (
-                f"The search ended after {found.search.settings.predictions} predictions of the "
+                f"The search ended after {found.search.counted.calls} predictions of the "
                 "twin; weaker causes beside what was found were not looked for.",
             )
         found.complete = True
@@ -127,17 +127,22 @@ def _settle(found: Findings, told: Progress) -> None:
 
 
 def _compare(found: Findings, told: Progress) -> None:
-    """Rivals of every cause. A cause that explains no more than a special case of it gives way."""
+    """Rivals of every cause. A cause that explains no more than a special case of it gives way, and
+    what was compared with it is compared anew."""
     search = found.search
-    for key in search.accepted():
+    gone: set[str] = set()
+    while (left := [key for key in search.accepted() if key not in found.rivals]) != []:
+        key = left[0]
         alike = rivals(search, key, found.confounding, told)
         special = simpler(search, key, alike)
-        if special is not None:
-            search.put_instead(key, special, alike[special])
-            del found.estimates[key]
-            _arrived(found)
-            key, alike = special, rivals(search, special, found.confounding, told)
-        found.rivals[key] = alike
+        if special is None or special in gone:
+            found.rivals[key] = alike
+            continue
+        gone.add(key)
+        search.put_instead(key, special, alike[special])
+        _arrived(found)
+        del found.estimates[key]
+        found.rivals.clear()
 
 
 def _may_be_absent(found: Findings, key: str) -> bool:

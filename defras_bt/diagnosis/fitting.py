@@ -124,7 +124,7 @@ def refine(counted: CountedProblem, fit: Fit, noise: Noise, *, iterations: int) 
             break
     else:
         arrived = False
-    calls = counted.calls - before
+    calls = fit.calls + counted.calls - before
     return Fit(fit.candidates, model, fit.free, residual, jacobian, calls, arrived)
 
 

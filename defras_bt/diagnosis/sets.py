@@ -24,6 +24,8 @@ from defras_sim.geometry import Floats
 
 _ALIKE = 0.8
 _MOST = 3
+_OFTEN = 0.2
+"""Of repetitions of the same measurement."""
 _BEHIND = 0.3
 """Of the named cause's statistic: rivals below it on the linearised model are not fitted."""
 
@@ -48,10 +50,21 @@ def rivals(search: Search, key: str, confounding: Confounding, told: Progress) -
 
 
 def simpler(search: Search, key: str, found: Mapping[str, Fit]) -> str | None:
-    """Of the rivals ``found`` of an accepted cause, one that is a special case of it; None where
-    there is none."""
+    """Of the rivals ``found`` of an accepted cause, one that is a special case of it and from whose
+    data as much would often speak for the cause; None where there is none.
+
+    A special case with which that is rare, but not rare enough to reject it, stays a rival.
+    """
     special = search.sketch.candidate(key).effect.special_cases
-    return next((r for r in found if search.sketch.candidate(r).effect.name in special), None)
+    return next(
+        (
+            rival
+            for rival, fit in found.items()
+            if search.sketch.candidate(rival).effect.name in special
+            and _chance(search, key, rival, search.fit, fit) >= _OFTEN
+        ),
+        None,
+    )
 
 
 def _stood_together(search: Search, key: str, rival: str) -> bool:
@@ -140,6 +153,12 @@ def _begun_from_ranking(search: Search, less: Fit, name: str, key: str) -> Fit |
 def _rejected(search: Search, key: str, rival: str, mine: Fit, fit: Fit) -> bool:
     """Whether data made by ``rival``, with its ``fit``, would hardly ever speak for ``key``, with
     the fit ``mine``, as the measured do."""
+    return _chance(search, key, rival, mine, fit) < search.settings.alike
+
+
+def _chance(search: Search, key: str, rival: str, mine: Fit, fit: Fit) -> float:
+    """Share of data made by ``rival``, with its ``fit``, on which ``key``, with the fit ``mine``,
+    is as far ahead as on the measured; 1 where it is not ahead at all."""
     columns = {
         name: search.tuned_columns(one, key, rival)
         for name, one in (("mine", mine), ("rival", fit))
@@ -161,7 +180,7 @@ def _rejected(search: Search, key: str, rival: str, mine: Fit, fit: Fit) -> bool
     rival_left = np.where(seen, fit.residual, 0.0)[:, None]
     measured = float(ahead(mine_left, rival_left)[0])
     if measured <= 0.0:
-        return False
+        return 1.0
     apart = mine_left - rival_left
     count, by_chance, begun = search.settings.surrogates, [], 0
     off = search.approximations(count)
@@ -171,4 +190,4 @@ def _rejected(search: Search, key: str, rival: str, mine: Fit, fit: Fit) -> bool
         if off is not None:
             drawn = drawn + np.where(seen[:, None], off[:, here], 0.0)
         by_chance.append(ahead(drawn + apart, drawn))
-    return measured > float(np.quantile(np.concatenate(by_chance), 1.0 - search.settings.alike))
+    return float(np.mean(np.concatenate(by_chance) >= measured))

@@ -116,7 +116,11 @@ def _cause(found: Findings, key: str) -> Cause:
         parameter = next((p for p in candidate.effect.parameters if p.name == name), None)
         others = [c for c in search.fit.candidates if c.effect is candidate.effect]
         if name not in estimates and parameter is not None and len(others) == 1:
-            estimates[name] = Estimate(float(value), parameter.unit, (float(value), float(value)))
+            known = (float(value), float(value))
+            if any(p.name == name for p in candidate.free):
+                # Fitted, but interrupted before anything was known of how well.
+                known = (parameter.lower, parameter.upper)
+            estimates[name] = Estimate(float(value), parameter.unit, known)
     return Cause(
         candidate.effect.name,
         candidate.site,
@@ -136,6 +140,12 @@ def _warnings(found: Findings, outside: bool) -> tuple[str, ...]:
         if found.search.accepted():
             names = ", ".join(found.search.accepted())
             sentences.append(f"A part of it looks like {names}, too little to be called the cause.")
+    elif found.search.accepted() and found.left.sensors:
+        where = ", ".join(found.left.sensors)
+        sentences.append(
+            f"What is left in {where} is not without order: something that no known effect "
+            "explains may add to what is named, or what is named may stand in for it."
+        )
     for key in found.unseen:
         sentences.append(
             f"{key} changes nothing that was measured in these motions, so nothing can be said "

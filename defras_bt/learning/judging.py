@@ -43,13 +43,14 @@ class Case:
 
     @property
     def before_m(self) -> float:
-        """Mean distance of the judging points under the belief.
+        """Mean distance of the judging points under the belief; NaN where there are none.
 
         Raises:
             NotRepeatable: the camera sees nothing of a shape.
         """
         camera, points = self.belief.depth_camera, self.parts.judging_points_m
-        return float(distances_m(camera, points, self.before)[0].mean())
+        distance_m = distances_m(camera, points, self.before)[0]
+        return float(distance_m.mean()) if len(distance_m) else float("nan")
 
     def judged(
         self, attached: Mask, probability: Floats, rule: AdoptionRule, rng: np.random.Generator
@@ -61,6 +62,9 @@ class Case:
             before_m = self.before_m
         except NotRepeatable as fault:
             return kept(belief, f"the observed motion cannot be repeated: {fault}", probability)
+        if not np.isfinite(before_m):
+            why = "nothing of the tissue was seen that estimates are not fitted to"
+            return kept(belief, why, probability)
         if np.array_equal(attached, belief.attached):
             why = "no change of attachments explains the observed shapes better"
             return kept(belief, why, probability, before_m)

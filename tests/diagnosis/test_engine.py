@@ -10,6 +10,7 @@ import pytest
 
 from defras_bt.diagnosis.diagnosis import Diagnosis
 from defras_bt.diagnosis.engine import diagnose
+from defras_bt.diagnosis.settings import Settings
 from defras_sim.effects.effect import Extension
 from defras_sim.geometry import Floats
 from tests.diagnosis.toy_problem import ToyProblem, toy
@@ -125,6 +126,26 @@ def test_a_special_case_that_explains_as_much_is_named_instead(
     assert 0.3 < low < high < 0.9
 
 
+@pytest.mark.parametrize("seed", [0, 2, 3])
+def test_a_cause_that_is_ahead_of_its_special_case_does_not_give_way(seed: int) -> None:
+    """Hidden is the general cause. What both joints are told differs too little to reject the
+    special one, but enough for such a lead to be rare with it."""
+    p = toy(np.random.default_rng(seed), {}, channels=2, length=600, ar=(0.6,))
+    told, noise = p.setpoints[0].copy(), p.measured[0] - p.setpoints[0]
+    told[:, 1] = told[:, 0] + 0.1 * told[:, 1]
+    measured = told + noise
+    measured[:, 0] += 0.3 * told[:, 1]
+    problem = ToyProblem(
+        [told],
+        [measured],
+        leave_out=["offset", "play", "bend", "ghost"],
+        special_cases={"coupling": ("scale",)},
+    )
+    found = diagnose(problem, np.random.default_rng(0))
+    assert found.verdict.verdict == "set"
+    assert found.verdict.ambiguous == ("coupling", "scale")
+
+
 class _Interrupted(ToyProblem):
     after = 3
 
@@ -137,13 +158,19 @@ class _Interrupted(ToyProblem):
 def test_an_interrupt_keeps_what_was_found() -> None:
     rng = np.random.default_rng(3)
     whole = toy(rng, {"bend": {"q1_bend": 0.3}, "play": {"q2_play": 2.0}})
-    for after in (1, 3, 8):
+    for after in (1, 3, 8, 12, 16, 20):
         problem = _Interrupted(whole.setpoints, whole.measured)
         problem.after = after
         found = diagnose(problem, np.random.default_rng(0))
         assert not found.complete
         assert any("interrupted" in warning for warning in found.verdict.warnings)
         assert np.isfinite(found.residual_before).any()
+        # What was fitted is not known to the last digit, whenever the interrupt came.
+        for cause in found.verdict.causes:
+            for estimate in cause.parameters.values():
+                low, high = estimate.interval90
+                assert low <= estimate.value <= high
+                assert low < high
     assert _named(found)
 
 
@@ -181,3 +208,17 @@ def test_samples_that_do_not_fit_the_residual_are_refused() -> None:
     whole = toy(np.random.default_rng(0), {}, length=100)
     with pytest.raises(ValueError, match="299 numbers and its samples label 300"):
         diagnose(Short(whole.setpoints, whole.measured), np.random.default_rng(0))
+
+
+def test_order_in_what_is_left_beside_a_name_is_told() -> None:
+    rng = np.random.default_rng(3)
+    hidden: Hidden = {"scale": {"q1_scale": 0.8}, "bend": {"q1_bend": 0.1}}
+    problem = toy(rng, hidden, leave_out=("bend", "coupling", "play"))
+    easily_pleased = Settings(outside_share=0.99)
+    found = diagnose(problem, np.random.default_rng(0), settings=easily_pleased)
+    assert found.verdict.verdict == "named"
+    assert any("is not without order" in warning for warning in found.verdict.warnings)
+    plain = toy(np.random.default_rng(3), {"scale": {"q1_scale": 0.8}})
+    rightly = diagnose(plain, np.random.default_rng(0)).verdict
+    assert rightly.verdict == "named"
+    assert not any("is not without order" in warning for warning in rightly.warnings)

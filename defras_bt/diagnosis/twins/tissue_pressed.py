@@ -12,7 +12,9 @@ from defras_sim.recorded_motion import ArmMotion
 LOW_M = 0.002
 """Over where the tissue was taken: lower than this, what is held reaches the bed."""
 PRESSED_N = 0.005
-"""Downwards, more than sensors of forces scatter."""
+"""Downwards: what holds held tissue elsewhere is smaller there."""
+_BEYOND_NOISE = 4.0
+"""Standard deviations: of noise, as many readings point down as up."""
 PRESSED_REMARK = (
     "Left out: {count} readings of forces with which a jaw pressed held tissue onto the bed."
 )
@@ -32,5 +34,13 @@ def pressed(arm: ArmMotion, frames: Integers, force_n: Floats) -> NDArray[np.boo
     last = np.clip(np.searchsorted(taken, frames, side="right") - 1, 0, None)
     above_m = arm.position_m[frames, 2] - arm.position_m[taken[last], 2]
     with np.errstate(invalid="ignore"):
-        down = force_n[:, 2] < -PRESSED_N
+        down = force_n[:, 2] < -max(PRESSED_N, _BEYOND_NOISE * _scatter_n(force_n[:, 2]))
     return np.asarray(arm.grasped[frames] & (above_m < LOW_M) & down)
+
+
+def _scatter_n(force_n: Floats) -> float:
+    """Standard deviation of the noise of readings (f,), by how they depart from straight lines
+    through their neighbours; most motion does not."""
+    bends = np.diff(force_n, n=2)
+    bends = bends[np.isfinite(bends)]
+    return 1.4826 * float(np.median(np.abs(bends))) / np.sqrt(6.0) if len(bends) else 0.0

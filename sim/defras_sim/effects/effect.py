@@ -61,7 +61,7 @@ class Effect(ABC):
     source: ClassVar[str]
     special_cases: ClassVar[tuple[str, ...]] = ()
     """Names of effects that this one comes to at some values of its parameters. Where one of them
-    explains as much, it is the simpler explanation, and this one says nothing else."""
+    explains as much as chance often gives, it is the simpler explanation."""
 
     def __repr__(self) -> str:
         return self.name

@@ -30,6 +30,19 @@ def test_only_a_push_where_the_tissue_was_taken_is_one_onto_the_bed() -> None:
     assert not pressed(motion(), frames, force_n(0.5 * PRESSED_N)).any()
 
 
+def test_noise_of_the_sensor_is_no_push() -> None:
+    """Held over the bed for long: readings that point down by chance stay, a push does not."""
+    rng = np.random.default_rng(2)
+    count = 200
+    still = ArmMotion(np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)), np.arange(count) > 5)
+    for sd_n in (0.002, 0.02, 2.0):
+        readings_n = sd_n * rng.standard_normal((count, 3))
+        assert pressed(still, np.arange(count), readings_n).sum() <= 1
+        readings_n[50:60, 2] -= 30.0 * sd_n
+        found = pressed(still, np.arange(count), readings_n)
+        assert found[50:60].all()
+
+
 def test_height_counts_from_where_the_tissue_was_taken() -> None:
     frames = np.array([2, 4])
     for start_m in (-0.1, 0.0, 0.3):
