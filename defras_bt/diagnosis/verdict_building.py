@@ -71,12 +71,15 @@ def _portrait(found: Findings, residual: Floats) -> tuple[Statistic, ...]:
 
 def _verdict(found: Findings, before: Floats, after: Floats) -> Verdict:
     search = found.search
-    accepted = search.accepted()
     removed = removed_share(before, after, search.samples)
+    accepted = search.accepted()
+    if removed is not None and removed < search.settings.relative_gain:
+        # As where a cause is clear in numbers that are as near as their sensors can tell.
+        accepted = ()
     left = None if removed is None else 1.0 - removed
     too_much = not accepted or (left is not None and left > search.settings.outside_share)
     outside = bool(found.left.sensors) and too_much
-    ambiguous = found.ambiguous()
+    ambiguous = found.ambiguous() if accepted else {}
     name: VerdictName = "nothing"
     if outside:
         name = "outside"
@@ -94,11 +97,11 @@ def _verdict(found: Findings, before: Floats, after: Floats) -> Verdict:
         excluded={} if outside else found.excluded,
         gain=Gain(
             removed if accepted else None,
-            found.further.get("beyond_range"),
-            found.further.get("new_grasp"),
+            found.further.get("beyond_range") if accepted else None,
+            found.further.get("new_grasp") if accepted else None,
         ),
         unexplained_share=left,
-        proposed_motion=None if outside else found.proposed,
+        proposed_motion=found.proposed if accepted and not outside else None,
         warnings=_warnings(found, outside),
     )
 

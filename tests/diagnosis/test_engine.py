@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from defras_bt.diagnosis import verdict_building
 from defras_bt.diagnosis.diagnosis import Diagnosis
 from defras_bt.diagnosis.engine import diagnose
+from defras_bt.diagnosis.problem import Samples
 from defras_bt.diagnosis.settings import Settings
 from defras_sim.effects.effect import Extension
 from defras_sim.geometry import Floats
@@ -222,3 +224,19 @@ def test_order_in_what_is_left_beside_a_name_is_told() -> None:
     rightly = diagnose(plain, np.random.default_rng(0)).verdict
     assert rightly.verdict == "named"
     assert not any("is not without order" in warning for warning in rightly.warnings)
+
+
+def test_what_brings_the_error_no_nearer_to_the_noise_is_not_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A cause may be clear in numbers that are off by no more than their sensors scatter."""
+    problem = toy(np.random.default_rng(3), {"scale": {"q1_scale": 0.8}})
+    assert _named(diagnose(problem, np.random.default_rng(0))) == ["scale@q1"]
+
+    def in_place(before: Floats, after: Floats, samples: Samples) -> float:
+        return 0.01
+
+    monkeypatch.setattr(verdict_building, "removed_share", in_place)
+    found = diagnose(problem, np.random.default_rng(0)).verdict
+    assert found.verdict == "nothing"
+    assert (found.causes, found.ambiguous, found.gain.in_range) == ((), (), None)
