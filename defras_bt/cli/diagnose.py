@@ -21,6 +21,7 @@ from defras_bt.diagnosis.engine import diagnose as diagnosed
 from defras_bt.diagnosis.recording_reader import UnusableRecording
 from defras_bt.diagnosis.report_files import write_diagnosis
 from defras_bt.diagnosis.report_terminal import print_diagnosis
+from defras_bt.diagnosis.settings import Settings
 from defras_bt.diagnosis.topic_map import read_topic_map
 from defras_bt.diagnosis.verdict_file import Origin
 from defras_bt.recording.versions import versions
@@ -54,6 +55,15 @@ def diagnose(
     ] = None,
     without: Annotated[
         list[str] | None, typer.Option(help="Effects that are not to be looked for.")
+    ] = None,
+    may_stay: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            max=1.0,
+            help="Share of the error that a name may leave, with order in it; above that the "
+            "verdict is outside. Usual: 0.05 for a retraction, 0.25 for arms and specimens.",
+        ),
     ] = None,
     jobs: Annotated[
         int, typer.Option(min=-1, help="Processes side by side; -1: one per core.")
@@ -107,6 +117,7 @@ def diagnose(
         diagnosis = diagnosed(
             material.problem,
             np.random.default_rng(seed),
+            settings=Settings(outside_share=may_stay),
             progress=told,
             beyond_range=material.beyond_range,
             new_grasp=material.new_grasp,

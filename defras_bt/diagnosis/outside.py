@@ -40,7 +40,8 @@ def left_over(
     (Sidak 1967).
 
     ``off`` (n, m): draws of what the twin itself may be off by. Floors say what is usual in one
-    channel; of many, the one that is off most is farther off than that by chance.
+    channel; of many, the one that is off most is farther off than that by chance, and all are
+    where causes change much.
     """
     drawn = np.concatenate(list(surrogates(noise, residual, count, rng)), axis=1)
     sensors = []
@@ -62,12 +63,14 @@ def left_over(
         floor = np.array([samples.channels[i].floor ** 2 for i in own])
         largest = float(np.quantile(spread.max(axis=0), chance))
         usual = scatter * largest + floor
+        own_error = float(counts @ floor)
         if off is not None:
             squared = np.stack([np.mean(off[keep] ** 2, axis=0) for keep in rows])
             worst = np.max((scatter[:, None] + squared) / usual[:, None], axis=0)
             usual = usual * max(1.0, float(np.quantile(worst, chance)))
+            own_error = max(own_error, float(np.quantile(counts @ squared, chance)))
         together = float(np.quantile(counts @ (scatter[:, None] * spread), chance))
-        whole = counts @ squares > together + counts @ floor
+        whole = counts @ squares > together + own_error
         single = squares > usual
         conspicuous = own if whole else [i for i, one in zip(own, single, strict=True) if one]
         if conspicuous and _order(noise, conspicuous) > _PREDICTABLE:

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from defras_bt.diagnosis.problem import Approximating, Problem
+
+_OUTSIDE = 0.25
+_OUTSIDE_KNOWN = 0.05
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -16,10 +21,8 @@ class Settings:
         causes: how many causes may be named at most.
         iterations: of a full fit; each costs a call of the residual, or a few.
         relative_gain: share of the remaining excess that a cause has to remove, held out.
-        outside_share: more of the excess than this left over, and structured, is "outside". Where
-            the true cause is lacking, the best fit of another one has left from nothing to 45 %;
-            where it is known, measured data have left up to 23 %.
-        predictions: of a twin that takes long, after which no further cause is looked for.
+        outside_share: more of the excess than this left over, and structured, is "outside"; None:
+            as :func:`outside_share` says.
         alike: a pair of causes whose difference is seen in fewer than this share of repetitions of
             the same measurement is a set.
     """
@@ -30,6 +33,19 @@ class Settings:
     causes: int = 12
     iterations: int = 6
     relative_gain: float = 0.03
-    outside_share: float = 0.25
+    outside_share: float | None = None
     alike: float = 0.025
     predictions: int = 150
+
+
+def outside_share(settings: Settings, problem: Problem) -> float:
+    """Share of the excess beyond which what is left beside causes makes the verdict "outside".
+
+    A twin that knows how far it is off by itself (:class:`Approximating`) finds only what is beyond
+    that, so little of it tells that something else is there: a twentieth, somewhat more than a
+    cause has to remove. For others it is a quarter: joints and specimens that were measured have
+    left up to 23 % beside the right cause, where it was known.
+    """
+    if settings.outside_share is not None:
+        return settings.outside_share
+    return _OUTSIDE_KNOWN if isinstance(problem, Approximating) else _OUTSIDE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from defras_bt.diagnosis.diagnosis import Diagnosis, Statistic
@@ -9,6 +11,7 @@ from defras_bt.diagnosis.excess import excess_by_sensor, removed_share
 from defras_bt.diagnosis.findings import Findings
 from defras_bt.diagnosis.portrait import portrait
 from defras_bt.diagnosis.problem import Covarying
+from defras_bt.diagnosis.settings import outside_share
 from defras_bt.diagnosis.verdict import Cause, Estimate, Gain, Verdict, VerdictName
 from defras_sim.geometry import Floats
 
@@ -77,7 +80,8 @@ def _verdict(found: Findings, before: Floats, after: Floats) -> Verdict:
         # As where a cause is clear in numbers that are as near as their sensors can tell.
         accepted = ()
     left = None if removed is None else 1.0 - removed
-    too_much = not accepted or (left is not None and left > search.settings.outside_share)
+    limit = outside_share(search.settings, search.counted.problem)
+    too_much = not accepted or (left is not None and left > limit)
     outside = bool(found.left.sensors) and too_much
     ambiguous = found.ambiguous() if accepted else {}
     name: VerdictName = "nothing"
@@ -102,7 +106,7 @@ def _verdict(found: Findings, before: Floats, after: Floats) -> Verdict:
         ),
         unexplained_share=left,
         proposed_motion=found.proposed if accepted and not outside else None,
-        warnings=_warnings(found, outside),
+        warnings=_warnings(found, outside, left),
     )
 
 
@@ -133,7 +137,18 @@ def _cause(found: Findings, key: str) -> Cause:
     )
 
 
-def _warnings(found: Findings, outside: bool) -> tuple[str, ...]:
+def _looks_like(accepted: tuple[str, ...], left: float | None) -> str:
+    names = ", ".join(accepted)
+    if left is None or left > 0.5:
+        return f"A part of it looks like {names}, too little to be called the cause."
+    return (
+        f"{100 * (1.0 - left):.0f} % of it looks like {names}. That is not called the cause, since "
+        "what it leaves has order: something that the library lacks may do nearly the same. "
+        f"--may-stay {math.ceil(100 * left) / 100:g} would name it all the same."
+    )
+
+
+def _warnings(found: Findings, outside: bool, left: float | None) -> tuple[str, ...]:
     sentences = []
     if not found.complete:
         sentences.append("The diagnosis was interrupted; what it had found by then is reported.")
@@ -141,8 +156,7 @@ def _warnings(found: Findings, outside: bool) -> tuple[str, ...]:
         where = ", ".join(found.left.sensors)
         sentences.append(f"Something that no known effect explains is left in: {where}.")
         if found.search.accepted():
-            names = ", ".join(found.search.accepted())
-            sentences.append(f"A part of it looks like {names}, too little to be called the cause.")
+            sentences.append(_looks_like(found.search.accepted(), left))
     elif found.search.accepted() and found.left.sensors:
         where = ", ".join(found.left.sensors)
         sentences.append(

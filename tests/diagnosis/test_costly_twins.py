@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from defras_bt.diagnosis.engine import diagnose
-from defras_bt.diagnosis.problem import Candidate, Samples, Tangent
+from defras_bt.diagnosis.problem import Candidate, Problem, Samples, Tangent
 from defras_bt.diagnosis.settings import Settings
+from defras_bt.diagnosis.verdict import Verdict
 from defras_sim.effects.effect import Extension, Values
 from defras_sim.geometry import Floats
 from tests.diagnosis.toy_problem import ToyProblem, toy
@@ -153,3 +154,25 @@ def test_what_a_coarse_twin_gets_wrong_is_not_named_once_it_is_accurate() -> Non
     value = found.verdict.causes[0].parameters["q2_offset"]
     assert value.interval90[0] <= 3.0 <= value.interval90[1]
     assert set(coarse.stood[-1]) == {"offset"}, "what is asked last is asked of what was named"
+
+
+def test_a_twin_that_knows_how_far_it_is_off_names_only_what_leaves_little_more() -> None:
+    hidden = {"scale": {"q1_scale": 0.8}, "bend": {"q1_bend": 0.035}}
+    measured = toy(np.random.default_rng(3), hidden, leave_out=("bend", "coupling", "play"))
+
+    def asked(problem: Problem, may_stay: float | None = None) -> Verdict:
+        settings = Settings(outside_share=may_stay)
+        return diagnose(problem, np.random.default_rng(0), settings=settings).verdict
+
+    unaware = asked(measured)
+    assert unaware.verdict == "named"
+    assert 0.05 < (unaware.unexplained_share or 0.0) < 0.25
+    aware = asked(Rough(measured, off=0.001))
+    assert aware.verdict == "outside"
+    assert not aware.causes
+    assert any("--may-stay" in sentence for sentence in aware.warnings)
+    assert asked(Rough(measured, off=0.001), may_stay=0.25).verdict == "named"
+    farther_off = asked(Rough(measured, off=0.5))
+    assert farther_off.verdict == "named"
+    assert not any("is not without order" in sentence for sentence in farther_off.warnings)
+    assert asked(Rough(measured, off=2.0)).verdict == "nothing"
