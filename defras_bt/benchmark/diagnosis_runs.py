@@ -22,6 +22,7 @@ from defras_bt.diagnosis.baselines import asked_of_baselines
 from defras_bt.diagnosis.diagnosis import Ranked
 from defras_bt.diagnosis.engine import diagnose
 from defras_bt.diagnosis.problem import Candidate, Problem, Samples, Tangent
+from defras_bt.diagnosis.recording import RecordedRun
 from defras_bt.diagnosis.recording_reader import read_recording
 from defras_bt.diagnosis.twins.tables import read_problem
 from defras_bt.diagnosis.twins.tissue import TissueProblem
@@ -29,10 +30,12 @@ from defras_bt.diagnosis.twins.tissue_candidates import tissue_candidates
 from defras_bt.diagnosis.verdict import Verdict
 from defras_sim.effects.effect import Extension
 from defras_sim.geometry import Floats
+from defras_sim.scene import GraspPoint
 from defras_sim.worlds.error import WorldError
 
 _BELIEVED = "sim1"
-_POINT, _OTHER_POINT = (2, 4), (4, 4)
+GRASPS: tuple[GraspPoint, ...] = ((2, 4), (4, 4))
+"""Where tissue is taken: at both where two retractions are diagnosed together."""
 
 
 @dataclass(frozen=True)
@@ -97,21 +100,29 @@ class _Material:
 
 
 def board_rows(
-    cases: Sequence[BoardCase], *, further: bool, baselines: bool, jobs: int
+    cases: Sequence[BoardCase], *, further: bool, baselines: bool, jobs: int, grasps: int = 1
 ) -> Iterator[BoardRow]:
     """A row for each case, as they end. ``further``: what was gained is measured on other
-    retractions, too."""
-    work = (delayed(board_row)(case, further=further, baselines=baselines) for case in cases)
+    retractions, too. ``grasps``: retractions at so many points (of :data:`GRASPS`) are diagnosed
+    together.
+
+    Raises:
+        ValueError: more grasps than there are.
+    """
+    if not 1 <= grasps <= len(GRASPS):
+        raise ValueError(f"grasps: {grasps}; valid are 1 to {len(GRASPS)}")
+    asked = delayed(board_row)
+    work = (asked(case, further=further, baselines=baselines, grasps=grasps) for case in cases)
     yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(work)
 
 
-def board_row(case: BoardCase, *, further: bool, baselines: bool) -> BoardRow:
+def board_row(case: BoardCase, *, further: bool, baselines: bool, grasps: int = 1) -> BoardRow:
     """Make the data of a case, and ask what is wrong with them.
 
     Where reality itself finds no equilibrium there is nothing to ask; the row says so.
     """
     try:
-        return _asked(case, further=further, baselines=baselines)
+        return _asked(case, further=further, baselines=baselines, grasps=grasps)
     except WorldError as error:
         nothing: dict[str, bool] = {}
         return BoardRow(
@@ -133,9 +144,9 @@ def board_row(case: BoardCase, *, further: bool, baselines: bool) -> BoardRow:
         )
 
 
-def _asked(case: BoardCase, *, further: bool, baselines: bool) -> BoardRow:
+def _asked(case: BoardCase, *, further: bool, baselines: bool, grasps: int) -> BoardRow:
     with TemporaryDirectory() as folder:
-        made = _made(case, Path(folder), further=further)
+        made = _made(case, Path(folder), further=further, grasps=grasps)
         problem: Problem = made.problem
         if case.board == "lacking" and case.twin != "tissue":
             problem = Without(problem, _effects(case))
@@ -191,10 +202,10 @@ def times_limit(ranking: Sequence[Ranked], chance: float, causes: Sequence[str])
     return round(float(np.sqrt(weakest / chance)), 2)
 
 
-def _made(case: BoardCase, folder: Path, *, further: bool) -> _Material:
+def _made(case: BoardCase, folder: Path, *, further: bool, grasps: int) -> _Material:
     rng = np.random.default_rng([case.seed, *case.key.encode()])
     if case.twin == "tissue":
-        return _retraction(case, folder, rng, further=further)
+        return _retraction(case, folder, rng, further=further, grasps=grasps)
     hidden = hidden_in_table(case, rng)
     file = folder / "measured.csv"
     (arm_table if case.twin == "arm" else coupon_table)(file, hidden, rng)
@@ -202,30 +213,36 @@ def _made(case: BoardCase, folder: Path, *, further: bool) -> _Material:
 
 
 def _retraction(
-    case: BoardCase, folder: Path, rng: np.random.Generator, *, further: bool
+    case: BoardCase, folder: Path, rng: np.random.Generator, *, further: bool, grasps: int
 ) -> _Material:
     scene = shipped(_BELIEVED)
     drawn = [draw(scene, cause, case.seed) for cause in case.causes or (NULL,)]
     hidden: dict[str, dict[str, float]] = {}
     for one in drawn:
         hidden |= {effect: dict(values) for effect, values in one.hidden.items()}
-
+    actual = reality(scene, hidden)
     candidates = tissue_candidates(_effects(case) if case.board == "lacking" else ())
 
-    def problem(point: tuple[int, int], number: int) -> TissueProblem:
+    def recorded(point: GraspPoint, number: int) -> RecordedRun:
         # Other retractions go other ways: their heights and speeds are drawn anew.
         script = draw(scene, NULL, case.seed + 7919 * number, point).script
         file = folder / f"measured_{number}.mcap"
-        script = drawn[0].script if number == 0 else script
-        actual = reality(scene, hidden)
-        record(actual, script, NoiseSpectrum(), rng, file)
-        run = read_recording(file, scene, None)
-        return TissueProblem(scene, [run], candidates, jobs=1, to_score=number > 0)
+        record(actual, drawn[0].script if number == 0 else script, NoiseSpectrum(), rng, file)
+        return read_recording(file, scene, None)
 
-    main = problem(_POINT, 0)
+    def problem(*runs: RecordedRun, to_score: bool) -> TissueProblem:
+        return TissueProblem(scene, runs, candidates, jobs=1, to_score=to_score)
+
+    first = [recorded(GRASPS[0], 0)]
+    if grasps > 1:
+        first.append(recorded(GRASPS[1], 2))
+    main = problem(*first, to_score=False)
     if not further or case.board != "one":
         return _Material(main, None, None, hidden)
-    return _Material(main, problem(_POINT, 1), problem(_OTHER_POINT, 2), hidden)
+    again = problem(recorded(GRASPS[0], 1), to_score=True)
+    if grasps > 1:
+        return _Material(main, again, None, hidden)  # no grasp is new
+    return _Material(main, again, problem(recorded(GRASPS[1], 2), to_score=True), hidden)
 
 
 def _effects(case: BoardCase) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from defras_bt.benchmark.diagnosis_boards import boards, in_words
 from defras_bt.benchmark.diagnosis_cases import BoardCase, board_cases
-from defras_bt.benchmark.diagnosis_runs import BoardRow, board_rows
+from defras_bt.benchmark.diagnosis_runs import GRASPS, BoardRow, board_rows
 from defras_bt.benchmark.files import write_benchmark
 from defras_bt.cli.errors import UserError
 from defras_bt.cli.files import folder_for
@@ -33,6 +33,17 @@ def diagnosis(
         int | None, typer.Option(min=0, help="Runs of every cause with it taken from the library.")
     ] = None,
     pairs: Annotated[int | None, typer.Option(min=0, help="Runs with two causes.")] = None,
+    only: Annotated[
+        str | None, typer.Option(help="Of the causes only these, separated by commas.")
+    ] = None,
+    grasps: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            max=len(GRASPS),
+            help="Retractions at so many grasp points are diagnosed together.",
+        ),
+    ] = 1,
     first_seed: Annotated[int, typer.Option(min=0)] = 0,
     jobs: Annotated[int, typer.Option(min=1, help="Runs side by side.")] = 2,
     resume: Annotated[bool, typer.Option(help="Go on with the rows in the folder.")] = False,
@@ -51,9 +62,12 @@ def diagnosis(
         asked += [twin for twin in get_args(TwinName) if twin == name]
     counts = (seeds, nulls, lacking, pairs)
     cases = [case for twin in asked for case in _cases(twin, quick, counts, first_seed)]
+    if only is not None:
+        cases = _only(cases, only.split(","))
     folder_for(out)
     file = out / "diagnosis.rows.jsonl"
-    rows = _known(file, quick) if resume else []
+    question = {"quick": quick, "grasps": grasps}
+    rows = _known(file, question) if resume else []
     done = {row.key for row in rows}
     left = [case for case in cases if case.key not in done]
     console = sentences()
@@ -62,9 +76,9 @@ def diagnosis(
         counting(console) as bar,
     ):
         if not rows:
-            stream.write(json.dumps({"quick": quick}) + "\n")
+            stream.write(json.dumps(question) + "\n")
         task = bar.add_task("runs", total=len(cases), completed=len(cases) - len(left))
-        for row in board_rows(left, further=not quick, baselines=True, jobs=jobs):
+        for row in board_rows(left, further=not quick, baselines=True, jobs=jobs, grasps=grasps):
             rows.append(row)
             stream.write(json.dumps(row.as_dict()) + "\n")
             stream.flush()
@@ -132,7 +146,24 @@ def _cases(
     )
 
 
-def _known(file: Path, quick: bool) -> list[BoardRow]:
+def _only(cases: Sequence[BoardCase], wanted: Sequence[str]) -> list[BoardCase]:
+    """Cases that hide something of ``wanted``: keys, or effects at any site.
+
+    Raises:
+        UserError: one of them is hidden in none.
+    """
+
+    def names(case: BoardCase) -> set[str]:
+        return {name for cause in case.causes for name in (cause, cause.split("@")[0])}
+
+    known = sorted({name for case in cases for name in names(case)})
+    unknown = [name for name in wanted if name not in known]
+    if unknown:
+        raise UserError(f"--only {unknown[0]}: hidden are {', '.join(known)}")
+    return [case for case in cases if names(case) & set(wanted)]
+
+
+def _known(file: Path, question: Mapping[str, Any]) -> list[BoardRow]:
     """Rows of an interrupted benchmark; the last may be cut short.
 
     Raises:
@@ -141,6 +172,6 @@ def _known(file: Path, quick: bool) -> list[BoardRow]:
     if not file.exists():
         return []
     lines = file.read_text(encoding="utf-8").split("\n")[:-1]
-    if not lines or json.loads(lines[0]) != {"quick": quick}:
+    if not lines or json.loads(lines[0]) != question:
         raise UserError(f"{file} holds rows of another benchmark; start without --resume")
     return [BoardRow(**json.loads(line)) for line in lines[1:]]

@@ -11,7 +11,7 @@ import pytest
 
 from defras_bt.benchmark.diagnosis_boards import boards, confusion, in_words, is_right
 from defras_bt.benchmark.diagnosis_cases import CAUSES, BoardCase, board_cases
-from defras_bt.benchmark.diagnosis_runs import BoardRow, board_row, times_limit
+from defras_bt.benchmark.diagnosis_runs import BoardRow, board_row, board_rows, times_limit
 from defras_bt.cli.main import main
 from defras_bt.diagnosis.diagnosis import Ranked
 from defras_sim.effects.effect import TwinName
@@ -148,3 +148,39 @@ def test_the_command_leaves_its_boards(tmp_path: Path, monkeypatch: pytest.Monke
     written = json.loads((tmp_path / "diagnosis.json").read_text())
     assert written["tables"]["Score"][0]["false alarm"].endswith("of 2")
     assert not list(tmp_path.glob("*.jsonl"))
+
+
+def _ended(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> object:
+    asked = ["defras", "benchmark", "diagnosis", "--quick", "--twins", "coupon", *arguments]
+    monkeypatch.setattr(sys, "argv", asked)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return ended.value.code
+
+
+def test_only_some_causes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    counts = ["--seeds", "1", "--nulls", "0", "--lacking", "0", "--pairs", "0", "--jobs", "1"]
+    few = [*counts, "--only", "stress_relaxation", "--out", str(tmp_path)]
+    assert _ended(monkeypatch, *few) == 0
+    written = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert [row["case"] for row in written["tables"]["Every case"]] == [
+        "one coupon stress_relaxation 0"
+    ]
+    assert _ended(monkeypatch, *counts, "--only", "gravity", "--out", str(tmp_path)) == 2
+    assert "--only gravity: hidden are " in capsys.readouterr().err
+
+
+def test_rows_of_another_question_are_not_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "diagnosis.rows.jsonl").write_text('{"quick": true, "grasps": 2}\n')
+    assert _ended(monkeypatch, "--resume", "--out", str(tmp_path)) == 2
+    assert "start without --resume" in capsys.readouterr().err
+
+
+def test_more_grasps_than_there_are() -> None:
+    case = BoardCase("one", "coupon", ("stress_relaxation",), 0)
+    with pytest.raises(ValueError, match="valid are 1 to 2"):
+        list(board_rows([case], further=False, baselines=False, jobs=1, grasps=3))
