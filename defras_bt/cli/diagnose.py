@@ -62,7 +62,7 @@ def diagnose(
             min=0.0,
             max=1.0,
             help="Share of the error that a name may leave, with order in it; above that the "
-            "verdict is outside. Usual: 0.05 for a retraction, 0.25 for arms and specimens.",
+            "verdict is outside. Usual: 0.02 for a retraction, 0.25 for arms and specimens.",
         ),
     ] = None,
     jobs: Annotated[

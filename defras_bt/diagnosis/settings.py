@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from defras_bt.diagnosis.problem import Approximating, Problem
 
 _OUTSIDE = 0.25
-_OUTSIDE_KNOWN = 0.05
+_OUTSIDE_KNOWN = 0.02
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ def outside_share(settings: Settings, problem: Problem) -> float:
     """Share of the excess beyond which what is left beside causes makes the verdict "outside".
 
     A twin that knows how far it is off by itself (:class:`Approximating`) finds only what is beyond
-    that, so little of it tells that something else is there: a twentieth, somewhat more than a
-    cause has to remove. For others it is a quarter: joints and specimens that were measured have
-    left up to 23 % beside the right cause, where it was known.
+    that, so little of it tells that something else is there: a fiftieth, which only keeps "outside"
+    from what hardly matters. For others it is a quarter: joints and specimens that were measured
+    have left up to 23 % beside the right cause, where it was known.
     """
     if settings.outside_share is not None:
         return settings.outside_share
