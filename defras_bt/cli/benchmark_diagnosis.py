@@ -61,6 +61,8 @@ def diagnosis(
         if name not in get_args(TwinName):
             raise UserError(f"--twins {name}: valid are {', '.join(get_args(TwinName))}")
         asked += [twin for twin in get_args(TwinName) if twin == name]
+    if grasps > 1 and "tissue" not in asked:
+        raise UserError(f"--grasps {grasps}: only tissue is grasped; --twins names {twins}")
     counts = (seeds, nulls, lacking, pairs)
     cases = [case for twin in asked for case in _cases(twin, quick, counts, first_seed)]
     if only is not None:

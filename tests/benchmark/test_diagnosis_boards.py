@@ -195,3 +195,10 @@ def test_quick_boards_of_three_seeds_have_every_cause_of_a_retraction() -> None:
     hidden = [case.causes for seed in kept for case in kept[seed] if case.board == "one"]
     assert sorted(hidden) == sorted((cause,) for cause in CAUSES["tissue"])
     assert all([case.board for case in own].count("nothing") == 1 for own in kept.values())
+
+
+def test_specimens_are_not_grasped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert _ended(monkeypatch, "--grasps", "2", "--out", str(tmp_path)) == 2
+    assert "only tissue is grasped" in capsys.readouterr().err
