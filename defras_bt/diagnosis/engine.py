@@ -110,8 +110,7 @@ def _settle(found: Findings, told: Progress) -> None:
         if not doubtful:
             break
         # The last that came is the one that the others may have called for.
-        search.take_out(doubtful[-1])
-        del found.estimates[doubtful[-1]]
+        _doubt(found, doubtful[-1], told)
     _compare(found, told)
     told("which motion would tell causes apart", 0.55)
     found.proposed = proposed_motion(search, found.ambiguous())
@@ -124,6 +123,16 @@ def _settle(found: Findings, told: Progress) -> None:
     found.left = left_over(left, search.samples, search.noise, count, search.rng, off)
     told("what is excluded", 0.8)
     found.excluded, found.unseen = exclusions(search)
+
+
+def _doubt(found: Findings, key: str, told: Progress) -> None:
+    """Take out a cause that may as well be absent; others may have stood in its shadow."""
+    search = found.search
+    search.take_out(key)
+    search.doubted += (key,)
+    select(search, told)
+    fit_plainly(search)
+    found.estimates.clear()
 
 
 def _compare(found: Findings, told: Progress) -> None:

@@ -29,7 +29,8 @@ class Search:
     """What the selection has found so far; kept up to date, so that an interrupted search can be
     reported. ``fitted_with``: as if the noise were this parameters were fitted in the end, where
     that predicts better than ``noise``. ``was_cut_short``: before every candidate had its turn.
-    ``approached``: what the twin may be off by has changed since chance was measured last."""
+    ``approached``: what the twin may be off by has changed since chance was measured last.
+    ``doubted``: causes that may as well be absent, and are not tried again."""
 
     counted: CountedProblem
     samples: Samples
@@ -47,6 +48,7 @@ class Search:
     pairs: tuple[RankedPair, ...] = ()
     was_cut_short: bool = False
     approached: bool = False
+    doubted: tuple[str, ...] = ()
 
     def accepted(self) -> tuple[str, ...]:
         """Candidates of the present model that are not base."""
@@ -64,7 +66,9 @@ class Search:
         return tuple(
             c.key
             for c in self.sketch.candidates
-            if not c.base and not any(conflicts(c, other) for other in self.fit.candidates)
+            if not c.base
+            and c.key not in self.doubted
+            and not any(conflicts(c, other) for other in self.fit.candidates)
         )
 
     def nuisance_columns(self, *without: str) -> Floats:
@@ -77,17 +81,17 @@ class Search:
     def held_out(self, fit: Fit, noise: Noise, *without: str) -> HeldOut:
         """``fit`` with every fold predicted from the others, strengths and nuisances re-tuned."""
         columns = self.tuned_columns(fit, *without)
-        kept = sum(p.strength for _, p in fit.free)
+        kept = sum(p.is_tuned for _, p in fit.free)
         return hold_out(fit.residual, columns, noise, self.samples.fold, kept, self.fitted_with)
 
     def tuned_columns(self, fit: Fit, *without: str) -> Floats:
-        """Columns (n, k) of what is re-tuned in other data: strengths, then nuisances.
+        """Columns (n, k) of what is re-tuned in other data: strengths and amounts, then nuisances.
 
         Where and when something is stays as it was fitted, as it does where chance is measured:
         what is seen in one fold alone cannot be found without it.
         """
-        strengths = np.array([p.strength for _, p in fit.free], dtype=bool)
-        return np.concatenate((fit.jacobian[:, strengths], self.nuisance_columns(*without)), axis=1)
+        tuned = np.array([p.is_tuned for _, p in fit.free], dtype=bool)
+        return np.concatenate((fit.jacobian[:, tuned], self.nuisance_columns(*without)), axis=1)
 
     def approximations(self, count: int) -> Floats | None:
         """Draws (n, count) of what the twin itself may be off by, where it is known."""

@@ -34,7 +34,7 @@ class Settings:
     iterations: int = 6
     relative_gain: float = 0.03
     outside_share: float | None = None
-    alike: float = 0.025
+    alike: float = 0.01
     predictions: int = 150
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from defras_bt.diagnosis import verdict_building
+from defras_bt.diagnosis import engine, verdict_building
 from defras_bt.diagnosis.diagnosis import Diagnosis
 from defras_bt.diagnosis.engine import diagnose
 from defras_bt.diagnosis.problem import Samples
@@ -146,6 +146,23 @@ def test_a_cause_that_is_ahead_of_its_special_case_does_not_give_way(seed: int) 
     found = diagnose(problem, np.random.default_rng(0))
     assert found.verdict.verdict == "set"
     assert found.verdict.ambiguous == ("coupling", "scale")
+
+
+def test_what_stood_in_the_shadow_of_a_doubtful_cause_is_looked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two causes that do the same: when the one that was accepted may as well be absent, the other
+    is found, and the first is not tried again."""
+    first, other = "coupling@q1_from_q2", "scale@q1"
+    if _named(_scale_like_coupling()) == [other]:
+        first, other = other, first
+    monkeypatch.setattr(engine, "_may_be_absent", lambda _, key: key == first)
+    found = _scale_like_coupling()
+    assert _named(found) == [other]
+    doubted = next(i for i, each in enumerate(found.rounds) if each.removed == first)
+    later = [trial.key for each in found.rounds[doubted + 1 :] for trial in each.trials]
+    assert other in later
+    assert first not in later
 
 
 class _Interrupted(ToyProblem):

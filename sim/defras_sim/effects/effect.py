@@ -30,8 +30,10 @@ class EffectParameter:
     """One number of an effect.
 
     ``null``: where the effect is absent (any value may be meaningless then, as the place of an
-    attachment of no stiffness: ``strength`` is False for such). ``step``: a change that typically
-    shows, by which derivatives and searches are scaled.
+    attachment of no stiffness: ``strength`` is False for such). ``amount``: of these, one in
+    which predictions are linear where the effect is there; like a strength it is tuned anew where
+    data are held out, while a place or a time stays. ``step``: a change that typically shows, by
+    which derivatives and searches are scaled.
     """
 
     name: str
@@ -42,6 +44,12 @@ class EffectParameter:
     step: float
     meaning: str
     strength: bool = True
+    amount: bool = False
+
+    @property
+    def is_tuned(self) -> bool:
+        """Whether it is tuned anew where data are held out."""
+        return self.strength or self.amount
 
 
 class Effect(ABC):

@@ -29,13 +29,15 @@ def _of(joint: JointName) -> tuple[EffectParameter, ...]:
         meaning=f"what the drive of {joint} turns back before all slack is taken up",
     )  # fmt: skip
     share = EffectParameter(
-        share_name(joint), "1", null=1.0, lower=0.0, upper=1.0, step=0.2, strength=False,
+        share_name(joint), "1", null=1.0, lower=0.0, upper=1.0, step=0.2,
+        strength=False, amount=True,
         meaning=f"share of its lost motion that {joint} itself loses: 1 for a free gap, less where "
         "friction stretches a cable",
     )  # fmt: skip
     drags = tuple(
         EffectParameter(
-            drag_name(other, joint), "1", null=0.0, lower=-1.0, upper=1.0, step=0.2, strength=False,
+            drag_name(other, joint), "1", null=0.0, lower=-1.0, upper=1.0, step=0.2,
+            strength=False, amount=True,
             meaning=f"share of the lost motion of {joint} by which {other} is moved: their cables "
             "run through the shaft together",
         )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from defras_bt.benchmark.hidden_tables import (
+    arm_table,
     joint_columns,
     random_joints,
     remembering,
@@ -74,6 +75,21 @@ def test_where_nothing_is_wrong_nothing_is_named_and_play_is_excluded(tmp_path):
     excluded = diagnosis.verdict.excluded["joint_play@q5"]
     assert excluded.unit == "rad"
     assert excluded.strength < 0.05
+
+
+@pytest.mark.parametrize("seed", [3058, 3135, 3150])
+def test_shares_of_lost_motion_do_not_let_play_foretell_the_folds_they_were_fitted_to(
+    tmp_path: Path, seed: int
+) -> None:
+    """Noise in which play of some width, with shares that suit all of it, looks like more than
+    chance; tuned without a fold, they do not foretell it."""
+    rng = np.random.default_rng([seed, *f"nothing arm nothing {seed}".encode()])
+    file = tmp_path / "measured.csv"
+    arm_table(file, {}, rng)
+    diagnosis = diagnose(read_problem([file], "arm"), np.random.default_rng(seed))
+    tried = [trial for each in diagnosis.rounds for trial in each.trials]
+    assert any(trial.key.startswith("joint_play") for trial in tried)
+    assert diagnosis.verdict.verdict == "nothing"
 
 
 @pytest.mark.parametrize(
