@@ -145,7 +145,7 @@ class TissueProblem:
 
     def approximations(self, count: int, rng: np.random.Generator) -> Floats:
         """Draws (n, count) of what the twin itself may be off by."""
-        return approximation_errors(self.samples, count, rng, self._explained)
+        return approximation_errors(self.samples, count, rng, self._explained, self._corrected)
 
     def covariates(self) -> Sequence[Covariate]:
         """How high held tissue is carried, as told."""

@@ -8,6 +8,9 @@ of the channels, which say how far models of one and the same tissue on differen
 they are known before any data. What an accepted cause does is no better known than the twin's mesh
 lets it be: a share of that is wrong too, or else the largest cause would have weaker ones named
 beside it for what the mesh makes of it.
+
+Where two meshes disagree by much more than floors say, as where tissue is pushed together and
+buckles one way or the other, neither is to be trusted: half of the difference may be wrong still.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from numpy.typing import NDArray
 
 from defras_bt.diagnosis.problem import Samples
 from defras_bt.diagnosis.twins.tissue_phases import PHASES
+from defras_bt.diagnosis.twins.tissue_samples import LEFT_OF_MESH
 from defras_sim.geometry import Floats
 
 SHARE = 0.5
@@ -30,10 +34,15 @@ ALIKE_M = 0.02
 
 
 def approximation_errors(
-    samples: Samples, count: int, rng: np.random.Generator, explained: Floats | None = None
+    samples: Samples,
+    count: int,
+    rng: np.random.Generator,
+    explained: Floats | None = None,
+    corrected: Floats | None = None,
 ) -> Floats:
     """Draws (n, count) of the twin's own errors in the numbers that are compared; ``explained``
-    (n,): what accepted causes of tissue and arms change of its predictions, if any are."""
+    (n,): what accepted causes of tissue and arms change of its predictions, if any are.
+    ``corrected`` (n,): what the finer mesh put right of them."""
     sd = np.array([SHARE * channel.floor for channel in samples.channels])
     field = _field(samples)
     found = np.zeros((len(samples.time_s), count))
@@ -51,7 +60,16 @@ def approximation_errors(
                 size = np.hypot(sd, RELATIVE * _root_mean_square(samples, rows, explained))
             drawn = size[:, None] * (lasting + passing) / np.sqrt(2.0)
             found[rows] = drawn[samples.channel[rows]]
+            if corrected is not None:
+                beyond = _beyond(corrected[rows], size[samples.channel[rows]])
+                found[rows] += np.outer(beyond, rng.standard_normal(count))
     return found
+
+
+def _beyond(corrected: Floats, size: Floats) -> Floats:
+    """What (n,) may be left of a correction beyond errors of standard deviation ``size`` (n,)."""
+    left = LEFT_OF_MESH * np.nan_to_num(corrected)
+    return np.asarray(np.sign(left) * np.sqrt(np.maximum(left**2 - size**2, 0.0)))
 
 
 def _root_mean_square(samples: Samples, rows: NDArray[np.bool_], values: Floats) -> Floats:

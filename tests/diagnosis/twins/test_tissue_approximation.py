@@ -73,3 +73,19 @@ def test_what_is_explained_is_wrong_by_a_share_where_it_shows() -> None:
     assert sd[0, 5] == pytest.approx(np.hypot(known, RELATIVE * 0.02), rel=0.05)
     assert sd[0, 10] == pytest.approx(known, rel=0.05)
     assert sd[2, 5] == pytest.approx(SHARE * CHANNELS[2].floor, rel=0.05)
+
+
+def test_where_meshes_disagree_by_more_than_floors_say_half_of_it_may_be_wrong() -> None:
+    corrected = np.zeros((len(CHANNELS), len(FRAMES)))
+    corrected[0, 15:18], corrected[0, 18:] = 4e-3, -2e-3
+    corrected[1, 5:10] = SHARE * CHANNELS[1].floor
+    corrected[2] = np.nan
+    rng = np.random.default_rng(5)
+    drawn = approximation_errors(samples(), 4000, rng, corrected=corrected.ravel())
+    drawn = drawn.reshape(len(CHANNELS), len(FRAMES), -1)
+    sd = drawn.std(axis=2)
+    assert sd[0, 15] == pytest.approx(2e-3, rel=0.05)
+    assert sd[0, 18] == pytest.approx(1e-3, rel=0.05)
+    assert np.corrcoef(drawn[0, 15], drawn[0, 18])[0, 1] < -0.9
+    for channel, frame in ((0, 5), (1, 5), (2, 5)):
+        assert sd[channel, frame] == pytest.approx(SHARE * CHANNELS[channel].floor, rel=0.05)
